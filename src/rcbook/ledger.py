@@ -1,0 +1,381 @@
+"""What a paper prints, what we compute for it, and the verdict that follows.
+
+A *claim* is one printed number or statement.  Claims live as data in ``rcbook/papers/KEY.toml``;
+a notebook opens the ledger of its paper, checks every claim against a value it has just computed,
+and shows the ledger.  Verdicts are derived here from value, printed digits and tolerance; nobody
+types them.
+"""
+
+from __future__ import annotations
+
+import html
+import json
+import math
+import re
+import string
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from decimal import Decimal
+from importlib import resources
+from numbers import Integral, Real
+
+MIME = "application/vnd.rcbook.ledger+json"
+
+REPRODUCED = "reproduced"
+CORRECTED = "reproduced with correction"
+NOT_REPRODUCED = "not reproduced"
+NOT_COMPUTABLE = "not computable"
+VERDICTS = (REPRODUCED, CORRECTED, NOT_REPRODUCED, NOT_COMPUTABLE)
+KINDS = ("number", "list", "bound", "statement", "measurement")
+
+_NUMBER = r"[+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?"
+_ONE_SIDED = re.compile(rf"([<>])({_NUMBER})")
+_SYMMETRIC = re.compile(rf"\+-({_NUMBER})")
+_RANGE = re.compile(rf"({_NUMBER})<=?\w+<=?({_NUMBER})")
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One printed number or statement, with the verdict we expect of it and why."""
+
+    id: str
+    paper: str
+    where: str
+    kind: str
+    says: str
+    printed: str
+    unit: str
+    expected: str
+    tolerance: float | None = None  # in the claim's unit; None: half a unit of the last digit
+    tolerance_reason: str = ""
+    convention: str = "primary"  # key of the paper's conventions
+    erratum: str = ""  # key of the paper's errata
+    reason: str = ""  # format string over the evidence
+
+
+@dataclass(frozen=True)
+class Paper:
+    """Everything `papers/KEY.toml` says about one paper."""
+
+    key: str
+    citation: str
+    notebook: str
+    conventions: Mapping[str, str]
+    errata: Mapping[str, Mapping[str, str]]
+    claims: Mapping[str, Claim]
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """A claim beside its computed value and the verdict that follows from both."""
+
+    claim: Claim
+    computed: object
+    verdict: str
+    reason: str
+    evidence: Mapping[str, object]
+
+    @property
+    def as_expected(self) -> bool:
+        return self.verdict == self.claim.expected
+
+    def __repr__(self) -> str:
+        flip = "" if self.as_expected else f"  (EXPECTED: {self.claim.expected})"
+        printed = self.claim.printed or "-"
+        return f"{self.claim.id}: printed {printed}, ours {show(self)}: {self.verdict}{flip}"
+
+
+def half_width(printed: str) -> float:
+    """Half a unit of the last printed digit of a number, `'0.8373'` giving 0.00005."""
+    return 0.5 * 10.0 ** Decimal(printed).as_tuple().exponent
+
+
+def truncate(value: float, printed: str) -> float:
+    """`value` cut, not rounded, to as many decimals as `printed` has."""
+    unit = Decimal(1).scaleb(Decimal(printed).as_tuple().exponent)
+    return float(int(Decimal(repr(float(value))) / unit) * unit)
+
+
+def papers() -> tuple[str, ...]:
+    """Keys of all papers in the package, sorted."""
+    files = resources.files("rcbook").joinpath("papers").iterdir()
+    return tuple(sorted(f.name.removesuffix(".toml") for f in files if f.name.endswith(".toml")))
+
+
+def load(key: str) -> Paper:
+    """Read and validate `papers/KEY.toml`.
+
+    Raises ValueError for an unknown key, a claim given twice, an unknown kind or verdict, a
+    reference to a convention or erratum that is not there, and a claim expected to fail whose
+    reason quotes nothing computed.
+    """
+    source = resources.files("rcbook").joinpath("papers", f"{key}.toml")
+    if not source.is_file():
+        raise ValueError(f"no paper {key!r}; choose one of {', '.join(papers())}")
+    data = tomllib.loads(source.read_text(encoding="utf-8"))
+    claims: dict[str, Claim] = {}
+    for entry in data["claims"]:
+        claim = Claim(paper=key, **entry)
+        if claim.id in claims:
+            raise ValueError(f"{claim.id} stands twice in {key}.toml; remove one")
+        _validate(claim, data["conventions"], data["errata"])
+        claims[claim.id] = claim
+    return Paper(
+        key, data["citation"], data["notebook"], data["conventions"], data["errata"], claims
+    )
+
+
+def _validate(claim: Claim, conventions: Mapping, errata: Mapping) -> None:
+    problem = ""
+    if not claim.id.startswith(f"{claim.paper}."):
+        problem = "its id does not begin with the paper's key"
+    elif claim.kind not in KINDS:
+        problem = f"kind {claim.kind!r} is none of {', '.join(KINDS)}"
+    elif claim.expected not in VERDICTS:
+        problem = f"expected {claim.expected!r} is none of {', '.join(VERDICTS)}"
+    elif claim.convention not in conventions:
+        problem = f"convention {claim.convention!r} is not in [conventions]"
+    elif claim.erratum and claim.erratum not in errata:
+        problem = f"erratum {claim.erratum!r} is not in [errata]"
+    elif (claim.tolerance is not None) != bool(claim.tolerance_reason):
+        problem = "a tolerance of its own needs a tolerance_reason, and the other way round"
+    elif (claim.kind == "measurement") != (claim.expected == NOT_COMPUTABLE):
+        problem = "a measurement, and nothing else, is not computable"
+    elif claim.expected in (NOT_REPRODUCED, NOT_COMPUTABLE) and not claim.reason:
+        problem = "it is expected to fail and gives no reason"
+    elif claim.expected == NOT_REPRODUCED and not _fields(claim.reason):
+        problem = "its reason quotes nothing computed; put evidence in {braces}"
+    elif claim.expected == CORRECTED and not claim.erratum and claim.convention == "primary":
+        problem = "a correction names its erratum or its convention"
+    if problem:
+        raise ValueError(f"{claim.id}: {problem}")
+
+
+def _fields(template: str) -> set[str]:
+    return {name for _, name, _, _ in string.Formatter().parse(template) if name}
+
+
+def agrees(claim: Claim, value: object) -> bool:
+    """Whether `value` agrees with what `claim` prints.
+
+    A number agrees within its tolerance; a list, number by number; a statement when it is True;
+    `<x` and `>x` when every value obeys; `+-x` when every value lies inside; and a range
+    `a<name<b` when the two computed ends agree with the two printed ones.
+    Raises ValueError when the value has not the shape the claim asks for.
+    """
+    if claim.kind == "statement":
+        if not isinstance(value, bool):
+            raise ValueError(f"{claim.id} is a statement: give True or False, not {value!r}")
+        return value
+    values = value if isinstance(value, list) else [value]
+    if claim.kind == "bound":
+        if match := _ONE_SIDED.fullmatch(claim.printed):
+            sign = 1.0 if match[1] == "<" else -1.0
+            return all(sign * v < sign * float(match[2]) for v in values)
+        if match := _SYMMETRIC.fullmatch(claim.printed):
+            return all(abs(v) <= float(match[1]) for v in values)
+        match = _RANGE.fullmatch(claim.printed)
+        if match is None:
+            raise ValueError(f"{claim.id}: cannot read {claim.printed!r} as a bound")
+        printed = list(match.groups())
+    else:
+        printed = claim.printed.split(";")
+    if len(printed) != len(values):
+        raise ValueError(
+            f"{claim.id} prints {len(printed)} number(s) and was given {len(values)}: {value!r}"
+        )
+    return all(
+        abs(v - float(p)) <= _tolerance(claim, p) * (1 + 1e-9)
+        for v, p in zip(values, printed, strict=True)
+    )
+
+
+def _tolerance(claim: Claim, printed: str) -> float:
+    return half_width(printed) if claim.tolerance is None else claim.tolerance
+
+
+def tolerances(claim: Claim) -> float | list[float] | None:
+    """The tolerance or tolerances that judge `claim`; None where nothing is rounded."""
+    if claim.kind == "number":
+        return _tolerance(claim, claim.printed)
+    if claim.kind == "list":
+        return [_tolerance(claim, p) for p in claim.printed.split(";")]
+    if claim.kind == "bound" and (match := _RANGE.fullmatch(claim.printed)):
+        return [_tolerance(claim, p) for p in match.groups()]
+    return None
+
+
+def judge(claim: Claim, value: object = None, corrected: object = None, **evidence) -> Judgement:
+    """Judge `claim` by the value its plain reading gives, else by the corrected reading.
+
+    The verdict is *reproduced* when `value` agrees; *reproduced with correction* when it does not
+    and `corrected`, computed under the claim's erratum or convention, does; *not reproduced* when
+    neither does; *not computable* for a measurement.  `evidence` are the numbers and booleans
+    that the claim's reason quotes; `value`, `corrected` and `printed` may be quoted as well.
+    """
+    value, corrected = _plain(claim, value), _plain(claim, corrected)
+    evidence = {name: _plain(claim, item, finite=False) for name, item in evidence.items()}
+    if claim.kind == "measurement":
+        verdict, computed = NOT_COMPUTABLE, (evidence or None)
+    elif value is None:
+        raise ValueError(f"{claim.id}: a {claim.kind} needs a computed value")
+    elif agrees(claim, value):
+        verdict, computed = REPRODUCED, value
+    elif corrected is not None and agrees(claim, corrected):
+        verdict, computed = CORRECTED, corrected
+        evidence = {"plain": value, **evidence} if claim.kind != "statement" else evidence
+    else:
+        verdict, computed = NOT_REPRODUCED, value
+    if claim.kind == "statement":
+        computed = {"holds": computed, **evidence}
+    known = {**evidence, "value": value, "corrected": corrected, "printed": claim.printed}
+    if absent := _fields(claim.reason) - known.keys():
+        raise ValueError(f"{claim.id}: its reason quotes {sorted(absent)}; pass them as evidence")
+    return Judgement(claim, computed, verdict, claim.reason.format(**known), evidence)
+
+
+def _plain(claim: Claim, item: object, finite: bool = True) -> object:
+    """`item` as Python numbers, because NumPy's are not JSON."""
+    if item is None or isinstance(item, bool):
+        return item
+    if hasattr(item, "tolist"):
+        item = item.tolist()
+    if isinstance(item, bool):
+        return item
+    if isinstance(item, Integral):
+        return int(item)
+    if isinstance(item, Real):
+        if math.isnan(item) or (finite and math.isinf(item)):
+            raise ValueError(f"{claim.id}: {item!r} is no result; say what was not reached")
+        return float(item)
+    if isinstance(item, Sequence) and not isinstance(item, str):
+        return [_plain(claim, part, finite) for part in item]
+    raise ValueError(f"{claim.id}: {item!r} is neither a real number nor a list of them")
+
+
+@dataclass
+class Ledger:
+    """The claims of one paper and the judgements made so far, in the order of the paper."""
+
+    paper: Paper
+    judgements: dict[str, Judgement] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, key: str) -> Ledger:
+        """An empty ledger for the paper `key`."""
+        return cls(load(key))
+
+    def check(self, id: str, value: object = None, corrected: object = None, **evidence):
+        """Judge claim `id` (see `judge`), keep the judgement and return it.
+
+        Raises ValueError for an id the paper does not have.
+        """
+        if id not in self.paper.claims:
+            raise ValueError(f"{self.paper.key} has no claim {id!r}; see papers/*.toml")
+        self.judgements[id] = judge(self.paper.claims[id], value, corrected, **evidence)
+        return self.judgements[id]
+
+    def missing(self) -> list[str]:
+        """Ids of the claims not checked yet."""
+        return [id for id in self.paper.claims if id not in self.judgements]
+
+    def rows(self) -> list[dict]:
+        """The judged claims as the list of objects that the ledger file holds."""
+        judged = (self.judgements[id] for id in self.paper.claims if id in self.judgements)
+        return [_row(self.paper, judgement) for judgement in judged]
+
+    def only(self, part: str) -> Ledger:
+        """The claims whose id holds `part`, as a ledger of its own, to show beside a figure."""
+        claims = {id: claim for id, claim in self.paper.claims.items() if part in id}
+        if not claims:
+            raise ValueError(f"no claim of {self.paper.key} has {part!r} in its id")
+        return Ledger(
+            Paper(**{**vars(self.paper), "claims": claims}),
+            {id: judgement for id, judgement in self.judgements.items() if id in claims},
+        )
+
+    def _repr_mimebundle_(self, include=None, exclude=None) -> dict:
+        text = "\n".join(repr(self.judgements[id]) for id in self.judgements)
+        return {"text/plain": text, "text/html": table(self.rows()), MIME: self.rows()}
+
+
+def _row(paper: Paper, judgement: Judgement) -> dict:
+    claim = judgement.claim
+    return {
+        "id": claim.id,
+        "paper": claim.paper,
+        "where": claim.where,
+        "says": claim.says,
+        "printed": claim.printed,
+        "unit": claim.unit,
+        "computed": _finite(judgement.computed),
+        "verdict": judgement.verdict,
+        "expected_verdict": claim.expected,
+        "tolerance": tolerances(claim),
+        "tolerance_reason": claim.tolerance_reason,
+        "convention": paper.conventions[claim.convention],
+        "reason": judgement.reason,
+        "erratum": claim.erratum,
+        "notebook": paper.notebook,
+        "kind": claim.kind,
+        "evidence": _finite(dict(judgement.evidence)),
+    }
+
+
+def _finite(item: object) -> object:
+    """`item` with infinities (a time never reached) as None, because JSON has no infinity."""
+    if isinstance(item, dict):
+        return {name: _finite(part) for name, part in item.items()}
+    if isinstance(item, list):
+        return [_finite(part) for part in item]
+    return None if isinstance(item, float) and math.isinf(item) else item
+
+
+def show(judgement: Judgement) -> str:
+    """The computed value of a judgement, rounded for reading."""
+    return show_value(_finite(judgement.computed))
+
+
+def show_value(computed: object) -> str:
+    """A computed value of the ledger file, rounded for reading."""
+    if computed is None:
+        return "-"
+    if isinstance(computed, bool):
+        return "holds" if computed else "does not hold"
+    if isinstance(computed, dict):
+        if "holds" in computed:
+            return show_value(computed["holds"])
+        return ", ".join(f"{name} {show_value(part)}" for name, part in computed.items())
+    if isinstance(computed, list):
+        return "; ".join(show_value(part) for part in computed)
+    return f"{computed:.6g}"
+
+
+def table(rows: Sequence[Mapping]) -> str:
+    """An HTML table of ledger rows: where, what, printed, ours, verdict, reason."""
+    head = "".join(f"<th>{h}</th>" for h in ("Claim", "Printed", "Ours", "Verdict", "Reason"))
+    body = "".join(_table_row(row) for row in rows)
+    return (
+        '<table class="rcbook-ledger"><thead><tr>'
+        f"{head}</tr></thead><tbody>{body}</tbody></table>"
+    )
+
+
+def _table_row(row: Mapping) -> str:
+    e = html.escape
+    unit = f" {e(row['unit'])}" if row["unit"] not in ("", "1") else ""
+    verdict = e(row["verdict"])
+    if row["verdict"] != row["expected_verdict"]:
+        verdict += f" <b>(expected: {e(row['expected_verdict'])})</b>"
+    return (
+        f'<tr data-verdict="{e(row["verdict"])}" data-paper="{e(row["paper"])}">'
+        f"<td>{e(row['says'])}<br><small>{e(row['where'])} · <code>{e(row['id'])}</code></small></td>"
+        f"<td>{e(row['printed'])}{unit}</td><td>{e(show_value(row['computed']))}</td>"
+        f"<td>{verdict}</td><td>{e(row['reason'])}</td></tr>"
+    )
+
+
+def dumps(rows: Sequence[Mapping]) -> str:
+    """Ledger rows as the text of the ledger file, at full precision, ending in a newline."""
+    return json.dumps(list(rows), indent=1, ensure_ascii=False, allow_nan=False) + "\n"

@@ -1,0 +1,1 @@
+"""Machines: physics and the parameter sets of the papers."""

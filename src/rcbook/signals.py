@@ -1,0 +1,100 @@
+"""Periodic references and disturbances, and what one measures on a response."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+
+def signal(values: ArrayLike, name: str = "signal", length: int | None = None) -> np.ndarray:
+    """Coerce to a 1-D float array of finite samples.
+
+    Raises ValueError for another shape, another length, NaN or infinity.
+    """
+    array = np.asarray(values, dtype=float)
+    if array.ndim != 1 or array.size == 0:
+        raise ValueError(f"{name} has shape {array.shape}; give one non-empty row of samples")
+    if length is not None and array.size != length:
+        raise ValueError(f"{name} has {array.size} samples and {length} are needed; make them agree")
+    if not np.all(np.isfinite(array)):
+        raise ValueError(f"{name} holds NaN or infinity from sample {_first_bad(array)} on; mend it")
+    return array
+
+
+def _first_bad(array: np.ndarray) -> int:
+    return int(np.argmin(np.isfinite(array)))
+
+
+def step(height: float, n: int, start: int = 0) -> np.ndarray:
+    """n samples: 0 before sample `start`, `height` from there on."""
+    return np.where(np.arange(n) >= start, float(height), 0.0)
+
+
+def sinusoid(amplitude: float, frequency: float, dt: float, n: int, phase: float = 0.0):
+    """n samples of amplitude sin(2 pi frequency k dt + phase); frequency in Hz, phase in rad."""
+    return amplitude * np.sin(2 * np.pi * frequency * dt * np.arange(n) + phase)
+
+
+def periodic(shape: ArrayLike, n: int) -> np.ndarray:
+    """n samples of the periodic signal whose one period is `shape`."""
+    return np.resize(signal(shape, "shape"), n)
+
+
+def random_period(period: int, amplitude: float, rng: np.random.Generator) -> np.ndarray:
+    """One period of a random shape with zero mean, scaled so that max - min = 2 amplitude."""
+    shape = rng.standard_normal(period)
+    shape -= shape.mean()
+    return shape * 2 * amplitude / spread(shape)
+
+
+def spread(y: ArrayLike) -> float:
+    """Maximum minus minimum."""
+    return float(np.ptp(signal(y)))
+
+
+def rms(y: ArrayLike) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(signal(y) ** 2)))
+
+
+def overshoot(y: ArrayLike, target: float) -> float:
+    """How far y exceeds a target of either sign, in percent of it; 0 when it never does.
+
+    Raises ValueError when the target is zero.
+    """
+    if target == 0:
+        raise ValueError("overshoot in percent needs a target other than 0")
+    return max(0.0, 100 * float(np.max(signal(y) / target) - 1))
+
+
+def settling_time(y: ArrayLike, target: ArrayLike, band: float, dt: float) -> float:
+    """Time in s of the last entry into |y - target| <= band, counted from the first sample.
+
+    It is the instant of the first sample after which no sample leaves the band; infinite when the
+    last sample is still outside, because the record then does not show a settled response.
+    Raises ValueError when the band is not positive.
+    """
+    if not band > 0:
+        raise ValueError(f"band = {band!r} must be positive")
+    outside = np.flatnonzero(np.abs(signal(y) - target) > band)
+    if outside.size == 0:
+        return 0.0
+    return np.inf if outside[-1] == len(y) - 1 else float((outside[-1] + 1) * dt)
+
+
+def harmonic(y: ArrayLike, period: int, order: int = 1) -> complex:
+    """Complex amplitude c of the harmonic |c| cos(2 pi order k/period + arg c) of y.
+
+    y must hold whole periods; raises ValueError when it does not.
+    """
+    y = signal(y)
+    if y.size % period:
+        raise ValueError(f"{y.size} samples are not whole periods of {period}; cut the record")
+    k = np.arange(y.size)
+    scale = 1 if order % period in (0, period / 2) else 2
+    return scale * complex(np.mean(y * np.exp(-2j * np.pi * order * k / period)))
+
+
+def phase_between(y: ArrayLike, x: ArrayLike, period: int) -> float:
+    """Phase of y relative to x at the fundamental, in degrees from -180 to 180; a lag is negative."""
+    return float(np.degrees(np.angle(harmonic(y, period) / harmonic(x, period))))
