@@ -59,6 +59,7 @@ class Paper:
     """Everything `papers/KEY.toml` says about one paper."""
 
     key: str
+    title: str
     citation: str
     notebook: str
     conventions: Mapping[str, str]
@@ -121,9 +122,8 @@ def load(key: str) -> Paper:
             raise ValueError(f"{claim.id} stands twice in {key}.toml; remove one")
         _validate(claim, data["conventions"], data["errata"])
         claims[claim.id] = claim
-    return Paper(
-        key, data["citation"], data["notebook"], data["conventions"], data["errata"], claims
-    )
+    head = (data[name] for name in ("title", "citation", "notebook", "conventions", "errata"))
+    return Paper(key, *head, claims)
 
 
 def _validate(claim: Claim, conventions: Mapping, errata: Mapping) -> None:
@@ -213,9 +213,10 @@ def judge(claim: Claim, value: object = None, corrected: object = None, **eviden
     and `corrected`, computed under the claim's erratum or convention, does; *not reproduced* when
     neither does; *not computable* for a measurement.  `evidence` are the numbers and booleans
     that the claim's reason quotes; `value`, `corrected` and `printed` may be quoted as well.
+    An infinite value says that what is printed does not exist; the evidence then stands for it.
     """
     value, corrected = _plain(claim, value), _plain(claim, corrected)
-    evidence = {name: _plain(claim, item, finite=False) for name, item in evidence.items()}
+    evidence = {name: _plain(claim, item) for name, item in evidence.items()}
     if claim.kind == "measurement":
         verdict, computed = NOT_COMPUTABLE, (evidence or None)
     elif value is None:
@@ -226,16 +227,17 @@ def judge(claim: Claim, value: object = None, corrected: object = None, **eviden
         verdict, computed = CORRECTED, corrected
         evidence = {"plain": value, **evidence} if claim.kind != "statement" else evidence
     else:
-        verdict, computed = NOT_REPRODUCED, value
+        verdict, computed = NOT_REPRODUCED, (evidence if value in (math.inf, -math.inf) else value)
     if claim.kind == "statement":
-        computed = {"holds": computed, **evidence}
+        mended = {} if corrected is None else {"holds_corrected": corrected}
+        computed = {"holds": value, **mended, **evidence}
     known = {**evidence, "value": value, "corrected": corrected, "printed": claim.printed}
     if absent := _fields(claim.reason) - known.keys():
         raise ValueError(f"{claim.id}: its reason quotes {sorted(absent)}; pass them as evidence")
     return Judgement(claim, computed, verdict, claim.reason.format(**known), evidence)
 
 
-def _plain(claim: Claim, item: object, finite: bool = True) -> object:
+def _plain(claim: Claim, item: object) -> object:
     """`item` as Python numbers, because NumPy's are not JSON."""
     if item is None or isinstance(item, bool):
         return item
@@ -246,12 +248,22 @@ def _plain(claim: Claim, item: object, finite: bool = True) -> object:
     if isinstance(item, Integral):
         return int(item)
     if isinstance(item, Real):
-        if math.isnan(item) or (finite and math.isinf(item)):
-            raise ValueError(f"{claim.id}: {item!r} is no result; say what was not reached")
+        if math.isnan(item):
+            raise ValueError(f"{claim.id}: NaN is no result; give a number, or inf for 'never'")
         return float(item)
     if isinstance(item, Sequence) and not isinstance(item, str):
-        return [_plain(claim, part, finite) for part in item]
+        return [_plain(claim, part) for part in item]
     raise ValueError(f"{claim.id}: {item!r} is neither a real number nor a list of them")
+
+
+@dataclass(frozen=True)
+class Extract:
+    """Some rows of a ledger without their reasons; shown, it is a table and carries no verdicts."""
+
+    rows: Sequence[Mapping]
+
+    def _repr_html_(self) -> str:
+        return table(self.rows, reasons=False)
 
 
 @dataclass
@@ -260,6 +272,7 @@ class Ledger:
 
     paper: Paper
     judgements: dict[str, Judgement] = field(default_factory=dict)
+    _fresh: list[str] = field(default_factory=list)
 
     @classmethod
     def of(cls, key: str) -> Ledger:
@@ -274,6 +287,7 @@ class Ledger:
         if id not in self.paper.claims:
             raise ValueError(f"{self.paper.key} has no claim {id!r}; see papers/*.toml")
         self.judgements[id] = judge(self.paper.claims[id], value, corrected, **evidence)
+        self._fresh.append(id)
         return self.judgements[id]
 
     def missing(self) -> list[str]:
@@ -285,15 +299,11 @@ class Ledger:
         judged = (self.judgements[id] for id in self.paper.claims if id in self.judgements)
         return [_row(self.paper, judgement) for judgement in judged]
 
-    def only(self, part: str) -> Ledger:
-        """The claims whose id holds `part`, as a ledger of its own, to show beside a figure."""
-        claims = {id: claim for id, claim in self.paper.claims.items() if part in id}
-        if not claims:
-            raise ValueError(f"no claim of {self.paper.key} has {part!r} in its id")
-        return Ledger(
-            Paper(**{**vars(self.paper), "claims": claims}),
-            {id: judgement for id, judgement in self.judgements.items() if id in claims},
-        )
+    def latest(self) -> Extract:
+        """The judgements made since the last call, as a short table to show under them."""
+        rows = [_row(self.paper, self.judgements[id]) for id in self._fresh]
+        self._fresh.clear()
+        return Extract(rows)
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict:
         text = "\n".join(repr(self.judgements[id]) for id in self.judgements)
@@ -345,34 +355,36 @@ def show_value(computed: object) -> str:
         return "holds" if computed else "does not hold"
     if isinstance(computed, dict):
         if "holds" in computed:
-            return show_value(computed["holds"])
+            mended = "; corrected, it holds" if computed.get("holds_corrected") else ""
+            return show_value(computed["holds"]) + mended
         return ", ".join(f"{name} {show_value(part)}" for name, part in computed.items())
     if isinstance(computed, list):
         return "; ".join(show_value(part) for part in computed)
     return f"{computed:.6g}"
 
 
-def table(rows: Sequence[Mapping]) -> str:
-    """An HTML table of ledger rows: where, what, printed, ours, verdict, reason."""
-    head = "".join(f"<th>{h}</th>" for h in ("Claim", "Printed", "Ours", "Verdict", "Reason"))
-    body = "".join(_table_row(row) for row in rows)
+def table(rows: Sequence[Mapping], reasons: bool = True) -> str:
+    """An HTML table of ledger rows: claim, printed, ours, verdict and, if wanted, the reason."""
+    heads = ["Claim", "Printed", "Ours", "Verdict"] + ["Reason"] * reasons
+    head = "".join(f"<th>{h}</th>" for h in heads)
+    body = "".join(_table_row(row, reasons) for row in rows)
     return (
-        '<table class="rcbook-ledger"><thead><tr>'
-        f"{head}</tr></thead><tbody>{body}</tbody></table>"
+        f'<table class="rcbook-ledger"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
     )
 
 
-def _table_row(row: Mapping) -> str:
+def _table_row(row: Mapping, reasons: bool) -> str:
     e = html.escape
     unit = f" {e(row['unit'])}" if row["unit"] not in ("", "1") else ""
     verdict = e(row["verdict"])
     if row["verdict"] != row["expected_verdict"]:
         verdict += f" <b>(expected: {e(row['expected_verdict'])})</b>"
+    where = f"{e(row['where'])} · <code>{e(row['id'])}</code>"
     return (
         f'<tr data-verdict="{e(row["verdict"])}" data-paper="{e(row["paper"])}">'
-        f"<td>{e(row['says'])}<br><small>{e(row['where'])} · <code>{e(row['id'])}</code></small></td>"
+        f"<td>{e(row['says'])}<br><small>{where}</small></td>"
         f"<td>{e(row['printed'])}{unit}</td><td>{e(show_value(row['computed']))}</td>"
-        f"<td>{verdict}</td><td>{e(row['reason'])}</td></tr>"
+        f"<td>{verdict}</td>" + (f"<td>{e(row['reason'])}</td>" * reasons) + "</tr>"
     )
 
 

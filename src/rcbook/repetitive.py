@@ -2,9 +2,9 @@
 
 Signals, with the symbols used throughout::
 
-    r --(+)--> e --> k_r q z^-N C/(1 - q z^-N) --> u --(+)--> controller --> v --(+ w)--> plant --> y
-        -^                                             -^                                      |
-         |----------------------------------------------|---------------(+ noise)--------------|
+    r -(+)-> e -> k_r q z^-N C/(1 - q z^-N) -> u -(+)-> controller -> v -(+ w)-> plant -> y
+        -^                                          -^                                     |
+         |-------------------------------------------|-------------(+ noise)---------------|
 
 r reference, e error, u output of the repetitive controller, v command to the plant, w disturbance
 at the plant input, y output.  In a *cascade* u alone is the reference of the inner loop; in the
@@ -128,7 +128,7 @@ class RepetitiveController:
 
 @dataclass(frozen=True)
 class Loop:
-    """A process, with a repetitive controller round it or (None) with the reference fed straight in.
+    """A process with a repetitive controller round it or, without one, fed by the reference.
 
     Design the compensator on one process and put another one here to study mismatch.
     """
@@ -150,7 +150,7 @@ class Loop:
         return replace(self, repetitive=replace(self.repetitive, gain=gain))
 
     def _generator_parts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Numerator, denominator and feedthrough of u = (feedthrough r + numerator e)/denominator."""
+        """ng, dg and through of u = (through r + ng e)/dg."""
         if self.repetitive is None:
             return np.zeros(1), np.ones(1), np.ones(1)
         numerator, denominator = self.repetitive.numerator, self.repetitive.denominator
@@ -368,10 +368,12 @@ def simulate(
         inner[k] = u[k] - feedback * measured
         memory_v[k] = (recall(n, inner, k) - recall(c, memory_v, k, 1)) / c[0]
         v[k] = np.clip(memory_v[k], -command_limit.value, command_limit.value)
-        memory_u[k], memory_v[k] = (u[k] if keep_u else memory_u[k]), (v[k] if keep_v else memory_v[k])
+        memory_u[k] = u[k] if keep_u else memory_u[k]
+        memory_v[k] = v[k] if keep_v else memory_v[k]
         sent[k] = v[k] + past_w[k]
     y, e, u, v = (s[lags:] for s in (y, e, u, v))
-    acted = [int(np.sum(np.abs(s) >= x.value)) for s, x in ((v, command_limit), (u, repetitive_limit))]
+    limited = ((v, command_limit), (u, repetitive_limit))
+    acted = [int(np.sum(np.abs(s) >= limit.value)) for s, limit in limited]
     return Run(loop.dt, r, w, y, v, u, e, u - (y + noise), *acted)
 
 
@@ -451,4 +453,5 @@ def noise_gain(loop: Loop, output: str = "output") -> float:
     n = int(np.ceil(np.log(1e-17) / np.log(radius))) + characteristic_polynomial(loop).size
     if n > 5_000_000:
         raise ValueError(f"spectral radius {radius:.9g} is too near 1 to sum the response")
-    return float(np.sqrt(np.mean(np.abs(_value(transfer(loop, "noise", output), zdomain.unit_circle(n))) ** 2)))
+    gain = np.abs(_value(transfer(loop, "noise", output), zdomain.unit_circle(n)))
+    return float(np.sqrt(np.mean(gain**2)))

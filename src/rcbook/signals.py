@@ -15,14 +15,11 @@ def signal(values: ArrayLike, name: str = "signal", length: int | None = None) -
     if array.ndim != 1 or array.size == 0:
         raise ValueError(f"{name} has shape {array.shape}; give one non-empty row of samples")
     if length is not None and array.size != length:
-        raise ValueError(f"{name} has {array.size} samples and {length} are needed; make them agree")
+        raise ValueError(f"{name} has {array.size} samples, {length} are needed; make them agree")
     if not np.all(np.isfinite(array)):
-        raise ValueError(f"{name} holds NaN or infinity from sample {_first_bad(array)} on; mend it")
+        first = int(np.argmin(np.isfinite(array)))
+        raise ValueError(f"{name} holds {array[first]} at sample {first}; give finite samples")
     return array
-
-
-def _first_bad(array: np.ndarray) -> int:
-    return int(np.argmin(np.isfinite(array)))
 
 
 def step(height: float, n: int, start: int = 0) -> np.ndarray:
@@ -96,5 +93,5 @@ def harmonic(y: ArrayLike, period: int, order: int = 1) -> complex:
 
 
 def phase_between(y: ArrayLike, x: ArrayLike, period: int) -> float:
-    """Phase of y relative to x at the fundamental, in degrees from -180 to 180; a lag is negative."""
+    """Phase of y relative to x at the fundamental, degrees from -180 to 180; a lag is negative."""
     return float(np.degrees(np.angle(harmonic(y, period) / harmonic(x, period))))

@@ -172,7 +172,7 @@ def zero_order_hold(system: control.StateSpace | control.TransferFunction, dt: f
     if not system.issiso():
         raise ValueError(f"{system.ninputs} inputs, {system.noutputs} outputs; pick one of each")
     if not system.isctime():
-        raise ValueError(f"the plant is sampled already (dt = {system.dt!r}); give a continuous one")
+        raise ValueError(f"the plant is sampled at dt = {system.dt!r}; give a continuous one")
     if isinstance(system, control.TransferFunction):
         num, den = (np.trim_zeros(p[0][0], "f") for p in (system.num, system.den))
         if num.size > den.size:

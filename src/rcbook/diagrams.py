@@ -1,0 +1,703 @@
+"""Drawn pictures: block diagrams made of items and wires, and the machines they stand for.
+
+A diagram is data.  `draw_block_diagram` takes blocks, sums, nodes and frames, and wires between
+their names; the `draw_..._loop` functions set out the loops that the case studies share.  Lengths
+are in diagram units: one unit is about the height of a block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Circle, FancyBboxPatch, Patch, Polygon, Rectangle
+from matplotlib.textpath import TextPath
+from scipy.interpolate import PchipInterpolator
+from scipy.signal import find_peaks
+
+INK = "#1a1a1a"
+DISTURBED = "#9c3a00"  # a darkened Okabe-Ito vermilion: 7:1 on white
+PAPER = "#ffffff"
+PLANT = "#ececec"  # fill of the machine
+FOCUS = "#bad8f0"  # fill of what the picture is about; darker than PLANT in grey, too
+
+Point = tuple[float, float]
+
+_EM = 0.36  # font size in diagram units
+_LARGEST_FONT = 16.0  # points; a diagram stops growing with its axes here
+_LINE = 1.2  # points
+_RADIUS = 0.24  # of a sum
+_DOT = 0.07  # radius of a pick-off
+_HEAD = (0.24, 0.09)  # length and half width of an arrow head
+_GAP = 0.9  # shortest wire between two parts of a row
+_BASELINE = 0.17  # of a label above its wire
+_COMPASS = {(1, 0): "e", (-1, 0): "w", (0, 1): "n", (0, -1): "s"}
+_SIGN_SPOTS = {
+    "w": (-_RADIUS - 0.17, -0.25),
+    "e": (_RADIUS + 0.17, -0.25),
+    "n": (0.25, _RADIUS + 0.16),
+    "s": (0.25, -_RADIUS - 0.16),
+}
+
+
+@dataclass(frozen=True)
+class Block:
+    """A box with text, centred at `xy`; a width or height left out is what the text needs."""
+
+    name: str
+    text: str
+    xy: Point = (0.0, 0.0)
+    width: float | None = None
+    height: float | None = None
+    fill: str = PAPER
+
+
+@dataclass(frozen=True)
+class Sum:
+    """A summing circle at `xy`; `signs` gives a sign to every side (n, e, s, w) a wire enters."""
+
+    name: str
+    xy: Point = (0.0, 0.0)
+    signs: Mapping[str, str] = field(default_factory=lambda: {"w": "+", "s": "−"})
+
+
+@dataclass(frozen=True)
+class Node:
+    """A pick-off dot at `xy`."""
+
+    name: str
+    xy: Point = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A dashed outline centred at `xy` around the parts that belong together."""
+
+    name: str
+    xy: Point
+    width: float
+    height: float
+
+
+@dataclass(frozen=True)
+class Wire:
+    """A right-angled wire between two items (by name) or free ends (points).
+
+    The wire leaves vertically to the height `via`, runs there, and arrives vertically; without
+    `via` it runs at the height of its start.
+    """
+
+    start: str | Point
+    end: str | Point
+    label: str = ""
+    via: float | None = None
+    color: str = INK
+
+
+Item = Block | Sum | Node | Frame
+
+
+class _Label(NamedTuple):
+    x: float
+    y: float
+    text: str
+    ha: str = "center"
+    va: str = "center"
+    color: str = INK
+
+
+def draw_block_diagram(ax: Axes, items: Sequence[Item], wires: Sequence[Wire]) -> Axes:
+    """Draw `items` and the `wires` between them; the axes' limits are set to fit.
+
+    Raises ValueError for a name used twice, a wire to an unknown name, a wire of no length, and
+    a wire that enters a sum on a side without a sign.
+    """
+    by_name = _by_name(items)
+    routes = [_route(wire, by_name) for wire in wires]
+    labels = _labels(items, wires, routes)
+    font = _fit(ax, _extent(items, routes, labels))
+    _paint(ax, items, wires, routes, labels, font)
+    return ax
+
+
+def draw_feedback_loop(
+    ax: Axes,
+    controller: str,
+    plant: str,
+    reference: str,
+    command: str,
+    output: str,
+    disturbance: str = "",
+    *,
+    error: str = "",
+    plant_input: str = "",
+    focus: bool = False,
+) -> Axes:
+    """Draw a unity feedback loop; arguments are the texts of its blocks and signals.
+
+    A `disturbance` is added between controller and plant; `focus` tints the controller.
+    """
+    load, load_label = _load(disturbance, plant_input)
+    parts = [
+        Sum("error"),
+        Block("controller", controller, fill=FOCUS if focus else PAPER),
+        *load,
+        Block("plant", plant, fill=PLANT),
+        Node("out"),
+    ]
+    items, wires = _row(parts, [reference, error, command, *load_label, "", output])
+    wires += [Wire("out", "error", via=-1.3), *_load_wire(items, disturbance)]
+    return draw_block_diagram(ax, items, wires)
+
+
+def draw_cascade_loop(
+    ax: Axes,
+    outer: str,
+    inner: str,
+    plant: str,
+    reference: str,
+    outer_command: str,
+    inner_command: str,
+    output: str,
+    disturbance: str = "",
+    *,
+    outer_error: str = "",
+    inner_error: str = "",
+    plant_input: str = "",
+    inner_loop: str = "",
+) -> Axes:
+    """Draw an outer controller that sets the reference of an inner feedback loop, all from texts.
+
+    A `disturbance` enters at the plant's input; a text for `inner_loop` frames and names that loop.
+    """
+    load, load_label = _load(disturbance, plant_input)
+    parts = [
+        Sum("outer error"),
+        Block("outer", outer, fill=FOCUS),
+        Sum("inner error"),
+        Block("inner", inner),
+        *load,
+        Block("plant", plant, fill=PLANT),
+        Node("inner out"),
+        Node("out"),
+    ]
+    into = [reference, outer_error, outer_command, inner_error, inner_command, *load_label, "", ""]
+    items, wires = _row(parts, [*into, output])
+    feedback = Wire("inner out", "inner error", inner_loop, via=-1.3)
+    wires += [feedback, Wire("out", "outer error", via=-2.0), *_load_wire(items, disturbance)]
+    if inner_loop:
+        items.append(_frame_around(items, "inner error", "inner out"))
+    return draw_block_diagram(ax, items, wires)
+
+
+def draw_plugin_loop(
+    ax: Axes,
+    repetitive: str,
+    controller: str,
+    plant: str,
+    reference: str,
+    command: str,
+    output: str,
+    disturbance: str = "",
+    *,
+    error: str = "",
+    correction: str = "",
+    plant_input: str = "",
+) -> Axes:
+    """Draw a loop whose error passes a repetitive controller in parallel and is added to itself.
+
+    Arguments are the texts of blocks and signals; `correction` is what the repetitive controller
+    adds, the `disturbance` enters at the plant's input.
+    """
+    load, load_label = _load(disturbance, plant_input)
+    parts = [
+        Sum("error"),
+        Node("tap"),
+        Block("repetitive", repetitive, (0.0, 1.5), fill=FOCUS),
+        Sum("corrected", signs={"w": "+", "n": "+"}),
+        Block("controller", controller),
+        *load,
+        Block("plant", plant, fill=PLANT),
+        Node("out"),
+    ]
+    into = [reference, error, "", correction, "", command, *load_label, ""]
+    items, wires = _row(parts, [*into, output])
+    wires += [
+        Wire("tap", "corrected"),
+        Wire("out", "error", via=-1.3),
+        *_load_wire(items, disturbance),
+    ]
+    return draw_block_diagram(ax, items, wires)
+
+
+def draw_repetitive_generator(
+    ax: Axes,
+    gain: str = r"$k_r$",
+    memory: str = r"$q(z)\,z^{-(N-d-\nu)}$",
+    rest: str = r"$z^{-(d+\nu)}$",
+    compensator: str = r"$z^{-\nu}\,C(z)$",
+    error: str = r"$e$",
+    output: str = r"$u$",
+) -> Axes:
+    """Draw the inside of a repetitive controller; arguments are the texts of blocks and signals.
+
+    `memory` and `rest` close a positive loop over one period, `k_r q z^-(N-d) C / (1 - q z^-N)`
+    as a whole; the filter q and the advance nu of the inverse C lie inside the delay.
+    """
+    parts = [
+        Block("gain", gain),
+        Sum("sum", signs={"w": "+", "s": "+"}),
+        Block("memory", memory, fill=FOCUS),
+        Node("tap"),
+        Block("compensator", compensator),
+    ]
+    items, wires = _row(parts, [error, "", "", "", "", output])
+    middle = next(item.xy[0] for item in items if item.name == "memory")
+    items.append(Block("rest", rest, xy=(middle, -1.5), fill=FOCUS))
+    wires += [Wire("tap", "rest", via=-1.5), Wire("rest", "sum", via=-1.5)]
+    return draw_block_diagram(ax, items, wires)
+
+
+def draw_waviness(
+    ax: Axes,
+    eccentricity: float,
+    feed_per_turn: float,
+    radius: float,
+    flutes: int = 4,
+    turns: int = 3,
+) -> Axes:
+    """Plot the profile that `flutes` teeth of a cutter leave when it runs out; lengths in metres.
+
+    Each tooth leaves an arc of its own radius, `radius + eccentricity cos(2 pi i / flutes)`, and
+    the deepest arc remains; feed is drawn in mm, height in micrometres.
+
+    Raises ValueError when the arcs are too short for the length drawn.
+    """
+    if (turns + 1) * feed_per_turn >= radius - abs(eccentricity):
+        raise ValueError(
+            f"a cutter of radius {radius:g} m does not reach over {turns} turns of feed "
+            f"{feed_per_turn:g} m: draw fewer turns, or check that all lengths are in metres"
+        )
+    x = np.linspace(0.0, turns * feed_per_turn, 80 * flutes * turns + 1)  # hits every crest
+    tooth = np.arange(-flutes, (turns + 1) * flutes + 1)
+    reach = radius + eccentricity * np.cos(2 * np.pi * tooth / flutes)
+    behind = x[:, None] - tooth * feed_per_turn / flutes
+    height = np.min(radius - np.sqrt(reach**2 - behind**2), axis=1)
+    ax.plot(1e3 * x, 1e6 * height, label=f"eccentricity {1e6 * eccentricity:g} µm")
+    ax.set_xlabel("distance along the feed (mm)")
+    ax.set_ylabel("height (µm)")
+    return ax
+
+
+# --- the milling machine -------------------------------------------------------------------------
+
+_SPINDLE = (3.9, 5.42)
+_CUTTER = 1.35  # radius
+_OFFSET = 0.27  # of the cutter's axis from the spindle's, far larger than in truth
+_PHASE = np.radians(-35.0)  # where the cutter's axis stands on its orbit
+_TURN = 1.6  # feed during one turn, far larger than in truth
+_UNCUT = 4.4  # height of the uncut edge
+_PIECE = (1.3, 8.1)  # left and right end of the workpiece
+
+
+def draw_milling_setup(ax: Axes) -> Axes:
+    """Draw side milling seen along the spindle axis, and the path from force to feed command.
+
+    Made for a figure of about 8 by 4.2 inches; runout, depth of cut and feed are exaggerated.
+    """
+    font = 1.08 * _fit(ax, (0.0, 0.0, 16.0, 8.4))
+    _draw_table(ax)
+    _draw_workpiece(ax, font)
+    _draw_cutter(ax)
+    _draw_signal_path(ax, font)
+    for label, target in _milling_notes():
+        _write(ax, label, font)
+        if target is not None:
+            anchor, tip = target
+            line = {"color": label.color, "linewidth": 0.8, "linestyle": "-"}
+            ax.plot(*zip(anchor, tip, strict=True), zorder=4, **line)
+    return ax
+
+
+def _milling_notes() -> list[tuple[_Label, tuple[Point, Point] | None]]:
+    """The words on the picture, and the line from a word to what it names."""
+    x, y = _cutter_axis()
+    rim = (_SPINDLE[0] - 1.06, _SPINDLE[1] + 0.62)
+    offset = _Label(6.4, 6.35, "cutter axis,\noff by the runout", "left", color=DISTURBED)
+    return [
+        (_Label(_SPINDLE[0], 7.95, "600 rpm"), None),
+        (_Label(0.1, 7.0, "four-flute\ncutter, 3/8 in", "left"), ((2.0, 6.4), rim)),
+        (_Label(6.4, 7.45, "spindle axis", "left"), ((6.3, 7.42), _SPINDLE)),
+        (offset, ((6.3, 6.35), (x, y))),
+        (_Label(4.7, 3.35, "workpiece"), None),
+        (_Label(4.7, 1.52, "dynamometer"), None),
+        (_Label(0.7, 0.64, "CNC table", "left"), None),
+        (_Label(5.2, 0.64, "feed", "right"), None),
+    ]
+
+
+def _draw_table(ax: Axes) -> None:
+    """Table with its slots, dynamometer, and the direction of feed."""
+    ink = {"edgecolor": INK, "linewidth": _LINE}
+    ax.add_patch(Rectangle((0.3, 0.2), 9.0, 3.2, facecolor=PAPER, zorder=0.5, **ink))
+    for y in (1.5, 2.5):
+        ax.plot([0.36, 9.24], [y, y], color="#c4c4c4", linewidth=2.5, linestyle="-", zorder=0.6)
+    ax.add_patch(Rectangle((0.8, 1.08), 7.8, 2.0, facecolor=FOCUS, zorder=0.7, **ink))
+    ax.plot([5.45, 6.8], [0.62, 0.62], color=INK, linewidth=2.2, linestyle="-")
+    _head(ax, (7.1, 0.62), (1, 0), INK, scale=1.5)
+
+
+def _draw_workpiece(ax: Axes, font: float) -> None:
+    """Workpiece with its cut edge, and the length of one wave."""
+    x = np.linspace(*_PIECE, 1200)
+    y = _cut_edge(x)
+    outline = [(_PIECE[0], 2.0), *zip(x, y, strict=True), (_PIECE[1], 2.0)]
+    ax.add_patch(Polygon(outline, facecolor=PLANT, edgecolor=INK, linewidth=_LINE))
+    crest = x[find_peaks(y, prominence=0.05)[0]][-2:]
+    style = {"color": INK, "linewidth": 0.8, "linestyle": "-"}
+    for end in crest:
+        ax.plot([end, end], [y.max() - 0.2, y.max() + 0.35], **style)
+    ax.plot(crest, [y.max() + 0.2] * 2, **style)
+    for end, way in zip(crest, (-1, 1), strict=True):
+        _head(ax, (end, y.max() + 0.2), (way, 0), INK, scale=0.8)
+    _write(ax, _Label(crest[0] - 0.25, y.max() + 0.62, "one wave per turn", "left"), font)
+
+
+def _cutter_axis(turns_ago: np.ndarray | float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Axis of the cutter some turns ago, seen from the workpiece (clockwise, fed to the right)."""
+    angle = _PHASE + 2 * np.pi * np.asarray(turns_ago)
+    return (
+        _SPINDLE[0] + _TURN * np.asarray(turns_ago) + _OFFSET * np.cos(angle),
+        _SPINDLE[1] + _OFFSET * np.sin(angle),
+    )
+
+
+def _cut_edge(x: np.ndarray) -> np.ndarray:
+    """Height of the workpiece's edge: what all positions of the cutter up to now have left."""
+    across, along = _cutter_axis(np.linspace(0.0, 4.0, 801))
+    reach = _CUTTER**2 - (x[:, None] - across) ** 2
+    lowest = np.where(reach > 0, along - np.sqrt(np.maximum(reach, 0.0)), _UNCUT)
+    return np.minimum(lowest.min(axis=1), _UNCUT)
+
+
+def _draw_cutter(ax: Axes) -> None:
+    """Cutter, both axes, the circle that its outermost tooth sweeps, and the sense of rotation."""
+    (x, y), axis = _SPINDLE, _cutter_axis()
+    outline = _flutes() + axis
+    ax.add_patch(Polygon(outline, facecolor="#c4c4c4", edgecolor=INK, linewidth=_LINE, zorder=2))
+    swept = {"fill": False, "linestyle": (0, (5, 3)), "linewidth": 0.8, "edgecolor": INK}
+    ax.add_patch(Circle(_SPINDLE, _CUTTER + _OFFSET, zorder=3, **swept))
+    offset = {"color": DISTURBED, "linewidth": 2.4, "linestyle": "-"}
+    ax.plot(*zip(_SPINDLE, axis, strict=True), zorder=4, **offset)
+    ax.add_patch(Circle(axis, 0.08, facecolor=DISTURBED, linewidth=0, zorder=5))
+    for dx, dy in ((0.17, 0.0), (0.0, 0.17)):
+        cross = {"color": INK, "linewidth": 1.5, "linestyle": "-"}
+        ax.plot([x - dx, x + dx], [y - dy, y + dy], zorder=5, **cross)
+    turn = np.radians(np.linspace(125.0, 62.0, 60))  # clockwise, as seen from the spindle
+    arc = np.column_stack([x + 2.0 * np.cos(turn), y + 2.0 * np.sin(turn)])
+    ax.plot(*arc.T, color=INK, linewidth=1.6, linestyle="-")
+    step = np.array([np.sin(turn[-1]), -np.cos(turn[-1])])
+    _head(ax, tuple(arc[-1] + 0.25 * step), tuple(step), INK, scale=1.2)
+
+
+def _flutes() -> np.ndarray:
+    """Outline of a four-flute cutter about its own axis; the cutting faces lead clockwise."""
+    angle, reach = np.radians([0, 10, 35, 58, 76, 93]), [1.0, 0.95, 0.85, 0.64, 0.52, 0.56]
+    fine = np.linspace(0.0, angle[-1], 60)
+    ring = _CUTTER * np.tile(PchipInterpolator(angle, reach)(fine), 4)
+    turn = np.concatenate([fine + _PHASE + k * np.pi / 2 for k in range(4)])
+    return np.column_stack([ring * np.cos(turn), ring * np.sin(turn)])
+
+
+def _draw_signal_path(ax: Axes, font: float) -> None:
+    """From the dynamometer by way of filter, sampler and computer to the table."""
+    x, size = 14.2, {"width": 3.2, "height": 1.4}
+    items = [
+        Node("force", (8.35, 2.3)),
+        Block("filter", "low-pass\n30 Hz", (x, 7.2), **size),
+        Block("sampler", "sampled\nat 60 Hz", (x, 4.9), **size),
+        Block("computer", "computer", (x, 2.6), fill=FOCUS, **size),
+    ]
+    wires = [
+        Wire("force", "filter", "force $F$"),
+        Wire("filter", "sampler"),
+        Wire("sampler", "computer"),
+        Wire("computer", (9.3, 0.62), "feed command $V$ (mV)", via=0.62),
+    ]
+    by_name = _by_name(items)
+    routes = [_route(wire, by_name) for wire in wires]
+    routes[0] = [(8.35, 2.3), (10.3, 2.3), (10.3, 7.2), (x - 1.6, 7.2)]
+    _paint(ax, items, wires, routes, _labels(items, wires, routes), font)
+
+
+# --- the layout of loops -------------------------------------------------------------------------
+
+
+def _row(parts: Sequence[Item], labels: Sequence[str]) -> tuple[list[Item], list[Wire]]:
+    """Set out parts from left to right, with a wire before, between and after them.
+
+    A part keeps its height; a wire between two heights runs at the upper one.
+    """
+    x, placed = 0.0, []
+    for part, label in zip(parts, labels[:-1], strict=True):
+        half = _half_size(part)[0]
+        x += _length(label, arrow=not isinstance(part, Node)) + half
+        placed.append(replace(part, xy=(x, part.xy[1])))
+        x += half
+    stops = [(0.0, 0.0), *(part.name for part in parts), (x + _length(labels[-1]), 0.0)]
+    heights = [0.0, *(part.xy[1] for part in parts), 0.0]
+    wires = [
+        Wire(*ends, label, via=max(levels))
+        for ends, levels, label in zip(pairwise(stops), pairwise(heights), labels, strict=True)
+    ]
+    return placed, wires
+
+
+def _length(label: str, arrow: bool = True) -> float:
+    """Length of the wire that carries `label`."""
+    if not (label or arrow):
+        return 0.5
+    return max(_GAP, _text_size(label)[0] + 0.8)
+
+
+def _load(disturbance: str, plant_input: str) -> tuple[list[Item], list[str]]:
+    """The sum that lets a disturbance in, if there is one, and the label behind it."""
+    if not disturbance:
+        return [], []
+    return [Sum("load", signs={"w": "+", "n": "+"})], [plant_input]
+
+
+def _load_wire(items: Sequence[Item], disturbance: str) -> list[Wire]:
+    """The wire that brings the disturbance down to its sum."""
+    return [
+        Wire((item.xy[0], 1.1), "load", disturbance, color=DISTURBED)
+        for item in items
+        if item.name == "load"
+    ]
+
+
+def _frame_around(items: Sequence[Item], first: str, last: str) -> Frame:
+    """A frame around the inner loop that runs from the sum `first` to the node `last`."""
+    by_name = _by_name(items)
+    left = by_name[first].xy[0] - _RADIUS - 0.36
+    right = by_name[last].xy[0] + 0.22
+    bottom, top = -1.55, 0.8
+    centre = ((left + right) / 2, (bottom + top) / 2)
+    return Frame(f"{first} frame", centre, right - left, top - bottom)
+
+
+# --- where things are ----------------------------------------------------------------------------
+
+
+def _by_name(items: Sequence[Item]) -> dict[str, Item]:
+    named: dict[str, Item] = {}
+    for item in items:
+        if item.name in named:
+            raise ValueError(f"two items are named {item.name!r}: give every item its own name")
+        named[item.name] = item
+    return named
+
+
+def _item(end: str | Point, by_name: Mapping[str, Item]) -> Item:
+    """The item at the end of a wire; a free end is a node without ink."""
+    if not isinstance(end, str):
+        return Node("", end)
+    if end not in by_name:
+        known = ", ".join(map(repr, by_name)) or "no items"
+        raise ValueError(f"a wire ends at {end!r}, which is not drawn: use one of {known}")
+    return by_name[end]
+
+
+def _text_size(text: str) -> tuple[float, float]:
+    """Width and height of a text in diagram units."""
+    boxes = [TextPath((0, 0), line, size=_EM).get_extents() for line in text.split("\n") if line]
+    if not boxes:
+        return 0.0, 0.0
+    return max(b.width for b in boxes), max(b.height for b in boxes) + 1.2 * _EM * (len(boxes) - 1)
+
+
+def _half_size(item: Item) -> Point:
+    if isinstance(item, Sum):
+        return _RADIUS, _RADIUS
+    if isinstance(item, Node):
+        return 0.0, 0.0
+    width, height = _text_size(item.text) if isinstance(item, Block) else (0.0, 0.0)
+    width = max(1.1, width + 0.5) if item.width is None else item.width
+    height = max(1.0, height + 0.45) if item.height is None else item.height
+    return width / 2, height / 2
+
+
+def _route(wire: Wire, by_name: Mapping[str, Item]) -> list[Point]:
+    """Corners of a wire from border to border."""
+    start, end = _item(wire.start, by_name), _item(wire.end, by_name)
+    level = start.xy[1] if wire.via is None else wire.via
+    corners: list[Point] = []
+    for corner in (start.xy, (start.xy[0], level), (end.xy[0], level), end.xy):
+        if not corners or not np.allclose(corner, corners[-1]):
+            corners.append(corner)
+    if len(corners) < 2:
+        raise ValueError(f"the wire {wire.start!r} to {wire.end!r} has no length: move an end")
+    if isinstance(end, Sum) and (side := _side(end.xy, corners[-2])) not in end.signs:
+        raise ValueError(
+            f"a wire enters the sum {end.name!r} from side {side!r}, which has no sign: "
+            f"add {side!r} to its signs"
+        )
+    first, last = _border(start, corners[1]), _border(end, corners[-2])
+    return [first, *corners[1:-1], last]
+
+
+def _direction(here: Point, there: Point) -> tuple[int, int]:
+    """Compass step from `here` to `there` along the longer of the two offsets."""
+    dx, dy = there[0] - here[0], there[1] - here[1]
+    return (int(np.sign(dx)), 0) if abs(dx) > abs(dy) else (0, int(np.sign(dy)))
+
+
+def _side(here: Point, there: Point) -> str:
+    return _COMPASS[_direction(here, there)]
+
+
+def _border(item: Item, towards: Point) -> Point:
+    """Where a wire to `towards` crosses the outline of an item."""
+    (dx, dy), (half_x, half_y) = _direction(item.xy, towards), _half_size(item)
+    return item.xy[0] + dx * half_x, item.xy[1] + dy * half_y
+
+
+def _labels(
+    items: Sequence[Item], wires: Sequence[Wire], routes: Sequence[list[Point]]
+) -> list[_Label]:
+    """Every text of a diagram and its place."""
+    labels = [_Label(*item.xy, item.text) for item in items if isinstance(item, Block)]
+    for item in items:
+        if isinstance(item, Sum):
+            for side, sign in item.signs.items():
+                dx, dy = _SIGN_SPOTS[side]
+                labels.append(_Label(item.xy[0] + dx, item.xy[1] + dy, sign))
+    labels += [_wire_label(w, route) for w, route in zip(wires, routes, strict=True) if w.label]
+    return labels
+
+
+def _wire_label(wire: Wire, route: Sequence[Point]) -> _Label:
+    """Beyond a free vertical tail, else above the longest level run, else right of the wire."""
+    runs = list(pairwise(route))
+    level = [run for run in runs if _direction(*run)[1] == 0]
+    (x0, y0), (x1, y1) = max(level or runs, key=lambda run: np.hypot(*np.subtract(*run)))
+    if level:
+        head = _HEAD[0] * np.sign(x1 - x0) * ((x1, y1) == route[-1])
+        place = ((x0 + x1 - head) / 2, y0 + _BASELINE, wire.label, "center", "baseline")
+    elif not isinstance(wire.start, str) and y1 < y0:
+        place = (x0, y0 + 0.12, wire.label, "center", "bottom")
+    elif not isinstance(wire.start, str):
+        place = (x0, y0 - 0.1, wire.label, "center", "top")
+    else:
+        place = (x0 + 0.14, (y0 + y1) / 2, wire.label, "left", "center")
+    return _Label(*place, wire.color)
+
+
+def _extent(
+    items: Sequence[Item], routes: Sequence[list[Point]], labels: Sequence[_Label]
+) -> tuple[float, float, float, float]:
+    """Left, bottom, right and top of all ink."""
+    points = [point for route in routes for point in route]
+    for item in items:
+        (x, y), (dx, dy) = item.xy, _half_size(item)
+        points += [(x - dx, y - dy), (x + dx, y + dy)]
+    for label in labels:
+        width, height = _text_size(label.text)
+        x = label.x - width * {"left": 0.0, "center": 0.5, "right": 1.0}[label.ha]
+        below = {"baseline": 0.35, "bottom": 0.0, "center": 0.5, "top": 1.0}[label.va]
+        y = label.y - height * below
+        points += [(x, y), (x + width, y + height)]
+    x, y = np.array(points).T
+    return x.min() - 0.12, y.min() - 0.12, x.max() + 0.12, y.max() + 0.12
+
+
+# --- ink -----------------------------------------------------------------------------------------
+
+
+def _fit(ax: Axes, box: tuple[float, float, float, float]) -> float:
+    """Show `box` in the axes and return the font size, in points, that belongs to its scale."""
+    left, bottom, right, top = box
+    ax.set_axis_off()
+    ax.set_aspect("equal")
+    ax.set(xlim=(left, right), ylim=(bottom, top))
+    figure = ax.get_figure(root=True)
+    figure.draw_without_rendering()  # runs the layout, so that the scale below is the final one
+    unit = np.ptp(ax.transData.transform([(0, 0), (1, 0)])[:, 0]) * 72 / figure.dpi
+    shrink = max(1.0, unit * _EM / _LARGEST_FONT)
+    half_x, half_y = shrink * (right - left) / 2, shrink * (top - bottom) / 2
+    x, y = (left + right) / 2, (bottom + top) / 2
+    ax.set(xlim=(x - half_x, x + half_x), ylim=(y - half_y, y + half_y))
+    return unit * _EM / shrink
+
+
+def _paint(
+    ax: Axes,
+    items: Sequence[Item],
+    wires: Sequence[Wire],
+    routes: Sequence[list[Point]],
+    labels: Sequence[_Label],
+    font: float,
+) -> None:
+    for wire, route in zip(wires, routes, strict=True):
+        into_dot = any(isinstance(i, Node) and i.name == wire.end for i in items)
+        _draw_wire(ax, route, wire.color, arrow=not into_dot)
+    for item in items:
+        ax.add_patch(_shape(item))
+    for label in labels:
+        _write(ax, label, font)
+
+
+def _shape(item: Item) -> Patch:
+    """The patch that stands for an item."""
+    (x, y), (dx, dy) = item.xy, _half_size(item)
+    ink = {"edgecolor": INK, "linewidth": _LINE}
+    if isinstance(item, Node):
+        return Circle(item.xy, _DOT, facecolor=INK, linewidth=0, zorder=4)
+    if isinstance(item, Sum):
+        return Circle(item.xy, _RADIUS, facecolor=PAPER, zorder=3, **ink)
+    corner = (x - dx, y - dy)
+    if isinstance(item, Frame):
+        dashes = {"linestyle": (0, (5, 3)), "edgecolor": "#5a5a5a", "linewidth": 1.0}
+        return Rectangle(corner, 2 * dx, 2 * dy, fill=False, zorder=1, **dashes)
+    pad = "round,pad=0,rounding_size=0.08"
+    return FancyBboxPatch(corner, 2 * dx, 2 * dy, pad, facecolor=item.fill, zorder=3, **ink)
+
+
+def _draw_wire(ax: Axes, route: Sequence[Point], color: str, arrow: bool) -> None:
+    """A polyline whose arrow head ends exactly on the outline it points at."""
+    x, y = np.array(route, dtype=float).T
+    if arrow:
+        step = _direction(route[-2], route[-1])
+        _head(ax, route[-1], step, color)
+        x[-1] -= 0.6 * _HEAD[0] * step[0]
+        y[-1] -= 0.6 * _HEAD[0] * step[1]
+    style = {"linewidth": _LINE, "linestyle": "-", "marker": "", "solid_joinstyle": "miter"}
+    ax.plot(x, y, color=color, zorder=2, solid_capstyle="butt", **style)
+
+
+def _head(ax: Axes, tip: Point, step: Point, color: str, scale: float = 1.0) -> None:
+    """A filled arrow head with its tip at `tip`, pointing along the unit vector `step`."""
+    along, across = np.array(step, dtype=float), np.array([-step[1], step[0]], dtype=float)
+    length, half = scale * _HEAD[0], scale * _HEAD[1]
+    base = np.array(tip) - length * along
+    corners = [tip, base + half * across, base - half * across]
+    ax.add_patch(Polygon(corners, facecolor=color, linewidth=0, zorder=4))
+
+
+def _write(ax: Axes, label: _Label, font: float) -> None:
+    ax.text(
+        label.x,
+        label.y,
+        label.text,
+        ha=label.ha,
+        va=label.va,
+        color=label.color,
+        fontsize=font,
+        multialignment="left" if label.ha == "left" else "center",
+        linespacing=1.15,
+        zorder=5,
+    )

@@ -1,0 +1,387 @@
+"""The drawings: what a wire may say, that text stays readable, that grey print loses nothing."""
+
+from functools import cache
+from itertools import combinations, pairwise
+
+import matplotlib
+
+matplotlib.use("Agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import RendererAgg
+from matplotlib.colors import to_rgb
+from matplotlib.patches import Circle, FancyBboxPatch, Polygon
+from matplotlib.transforms import Bbox
+
+from rcbook import diagrams
+from rcbook.diagrams import Block, Frame, Node, Sum, Wire, draw_block_diagram
+
+F_REF, V_PI = r"$F_\mathrm{ref}$", r"$V_\mathrm{PI}$"
+
+
+def feedback(ax, **kwargs):
+    kwargs = {"error": r"$e_\mathrm{PI}$"} | kwargs
+    return diagrams.draw_feedback_loop(ax, "PI", "milling", F_REF, V_PI, "$F$", **kwargs)
+
+
+def cascade(ax, **kwargs):
+    errors = {"outer_error": "$e_r$", "inner_error": r"$e_\mathrm{PI}$"}
+    texts = ("$G_r$", "PI", "milling", F_REF, "$V_r$", V_PI, "$F$")
+    return diagrams.draw_cascade_loop(ax, *texts, **errors, **kwargs)
+
+
+def plugin(ax, **kwargs):
+    texts = ("repetitive\ncontroller", "PI", "spindle", "$r$", "$u$", "$y$")
+    return diagrams.draw_plugin_loop(ax, *texts, error="$e$", correction="$v$", **kwargs)
+
+
+def lumped(ax):
+    plant = r"$\dfrac{z^{-d}\,Q(z^{-1})}{P(z^{-1})}$"
+    texts = ("$G_r(z)$", plant, F_REF, "$V_r$", "$F$")
+    return diagrams.draw_feedback_loop(ax, *texts, error="$e_r$", focus=True)
+
+
+LAYOUTS = {
+    "feedback": feedback,
+    "feedback, disturbed": lambda ax: feedback(ax, disturbance="$W$", plant_input="$V$"),
+    "feedback, a fraction as plant": lumped,
+    "feedback, long texts": lambda ax: feedback(
+        ax, disturbance="runout $W(k)$", plant_input="feed command $V$", error="force error"
+    ),
+    "cascade": cascade,
+    "cascade, disturbed": lambda ax: cascade(ax, disturbance="$W$"),
+    "cascade, framed": lambda ax: cascade(
+        ax, disturbance="$W$", plant_input="$V$", inner_loop="closed PI loop $z^{-d}Q/P$"
+    ),
+    "plug-in": plugin,
+    "plug-in, disturbed": lambda ax: plugin(ax, disturbance="$w$"),
+    "generator": diagrams.draw_repetitive_generator,
+    "milling": diagrams.draw_milling_setup,
+}
+
+
+@pytest.fixture(autouse=True)
+def house_style():
+    with plt.style.context("rcbook.rcbook"):
+        yield
+    plt.close("all")
+
+
+@cache
+def rendered(draw, size=(8.0, 4.2)):
+    # kept between tests, which only look
+    figure, ax = plt.subplots(figsize=size)
+    assert draw(ax) is ax
+    figure.draw_without_rendering()
+    return figure, ax
+
+
+@cache
+def text_boxes(ax):
+    """Pixels that each text inks, in display coordinates; `Text` itself reports whole lines."""
+    width, height = map(int, ax.figure.bbox.size)
+    renderer = RendererAgg(width, height, ax.figure.dpi)
+    boxes = {}
+    for text in ax.texts:
+        renderer.clear()
+        text.draw(renderer)
+        rows, columns = np.nonzero(np.asarray(renderer.buffer_rgba())[..., 3])
+        x, y = columns[[columns.argmin(), columns.argmax()]], height - rows[[-1, 0]]
+        boxes[text.get_text(), *text.get_position()] = Bbox([[x[0], y[0] - 1], [x[1] + 1, y[1]]])
+    return boxes
+
+
+def outlines(ax):
+    """Corners and circles of everything a wire may point at, in data coordinates."""
+    boxes, circles = [], []
+    for patch in ax.patches:
+        if isinstance(patch, FancyBboxPatch):
+            boxes.append((patch.get_x(), patch.get_y(), patch.get_width(), patch.get_height()))
+        elif isinstance(patch, Circle):
+            circles.append((*patch.center, patch.radius))
+    return boxes, circles
+
+
+def heads(ax):
+    """Tips of the arrow heads: triangles whose first corner is the tip."""
+    found = [p.get_xy() for p in ax.patches if isinstance(p, Polygon) and len(p.get_xy()) == 4]
+    return [xy[0] for xy in found]
+
+
+def lightness(color):
+    """Relative luminance as the web accessibility guidelines (WCAG 2) define it."""
+    rgb = np.array(to_rgb(color))
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+def contrast(one, other):
+    dark, light = sorted((lightness(one), lightness(other)))
+    return (light + 0.05) / (dark + 0.05)
+
+
+# --- what a diagram refuses ----------------------------------------------------------------------
+
+
+def test_a_name_used_twice_is_named():
+    _, ax = plt.subplots()
+    with pytest.raises(ValueError, match=r"two items are named 'pi': give every item its own"):
+        draw_block_diagram(ax, [Block("pi", "PI"), Node("pi", (2, 0))], [])
+
+
+@pytest.mark.parametrize("ends", [("pi", "plnat"), ("plnat", "pi")])
+def test_a_wire_to_an_unknown_name_lists_the_known_ones(ends):
+    _, ax = plt.subplots()
+    with pytest.raises(ValueError, match=r"'plnat', which is not drawn: use one of 'pi', 'sum'"):
+        draw_block_diagram(ax, [Block("pi", "PI"), Sum("sum", (3, 0))], [Wire(*ends)])
+
+
+def test_a_wire_into_a_sum_needs_a_sign_on_its_side():
+    _, ax = plt.subplots()
+    wires = [Wire((3.0, 2.0), "sum")]
+    with pytest.raises(ValueError, match=r"'sum' from side 'n', which has no sign: add 'n'"):
+        draw_block_diagram(ax, [Sum("sum", (3, 0))], wires)
+
+
+def test_a_wire_of_no_length_is_refused():
+    _, ax = plt.subplots()
+    with pytest.raises(ValueError, match=r"'pi' to 'pi' has no length"):
+        draw_block_diagram(ax, [Block("pi", "PI")], [Wire("pi", "pi")])
+
+
+def test_a_refused_diagram_leaves_no_ink():
+    _, ax = plt.subplots()
+    with pytest.raises(ValueError, match="not drawn"):
+        draw_block_diagram(ax, [Block("pi", "PI")], [Wire("pi", "out")])
+    assert not ax.patches
+    assert not ax.texts
+
+
+# --- where wires end -----------------------------------------------------------------------------
+
+
+def test_arrow_tips_lie_on_the_outlines_they_point_at():
+    _, ax = plt.subplots()
+    items = [
+        Block("box", "box", (0, 0), width=2.0, height=1.0),
+        Sum("sum", (4, 0), signs={"w": "+", "n": "-"}),
+        Node("dot", (6, 0)),
+        Frame("all", (3, 0), 8.0, 3.0),
+    ]
+    wires = [
+        Wire((-3.0, 0.0), "box"),
+        Wire("box", "sum", "$u$"),
+        Wire((4.0, 2.0), "sum", "$w$"),
+        Wire("sum", "dot"),
+        Wire("dot", "box", via=-1.2),
+    ]
+    draw_block_diagram(ax, items, wires)
+    radius = outlines(ax)[1][0][2]
+    tips = {(round(float(x), 9), round(float(y), 9)) for x, y in heads(ax)}
+    assert tips == {(-1.0, 0.0), (4.0 - radius, 0.0), (4.0, radius), (0.0, -0.5)}  # none at a dot
+
+
+@pytest.mark.parametrize("name", LAYOUTS.keys() - {"milling"})
+def test_every_arrow_of_a_layout_ends_on_ink_or_is_the_output(name):
+    _, ax = rendered(LAYOUTS[name])
+    boxes, circles = outlines(ax)
+    loose = 0
+    for x, y in heads(ax):
+        on_box = any(
+            (np.isclose(abs(x - left - w / 2) - w / 2, 0) and abs(y - low - h / 2) <= h / 2)
+            or (np.isclose(abs(y - low - h / 2) - h / 2, 0) and abs(x - left - w / 2) <= w / 2)
+            for left, low, w, h in boxes
+        )
+        on_circle = any(np.isclose(np.hypot(x - cx, y - cy), r) for cx, cy, r in circles)
+        loose += not (on_box or on_circle)
+    assert loose == 1
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_wires_turn_only_at_right_angles(name):
+    _, ax = rendered(LAYOUTS[name])
+    for line in ax.lines:
+        if line.get_solid_joinstyle() == "miter":  # a wire; not the drawing of a machine
+            steps = np.abs(np.diff(line.get_xydata(), axis=0))
+            assert np.all(np.isclose(steps.min(axis=1), 0.0))
+
+
+# --- what a reader sees --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("size", [(8.0, 4.2), (5.0, 3.0), (12.0, 3.0)])
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_texts_stay_inside_the_figure_and_apart(name, size):
+    figure, ax = rendered(LAYOUTS[name], size)
+    boxes = text_boxes(ax)
+    assert len(boxes) >= 6
+    for text, box in boxes.items():
+        assert figure.bbox.x0 <= box.x0, text
+        assert figure.bbox.y0 <= box.y0, text
+        assert box.x1 <= figure.bbox.x1, text
+        assert box.y1 <= figure.bbox.y1, text
+    for (one, first), (other, second) in combinations(boxes.items(), 2):
+        assert not first.overlaps(second), (one, other)
+
+
+@pytest.mark.parametrize("size", [(8.0, 4.2), (5.0, 3.0)])
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_text_is_inside_a_block_or_clear_of_all_of_them(name, size):
+    _, ax = rendered(LAYOUTS[name], size)
+    blocks = [p.get_window_extent() for p in ax.patches if isinstance(p, FancyBboxPatch)]
+    circles = [p.get_window_extent() for p in ax.patches if isinstance(p, Circle)]
+    circles = [((c.x0 + c.x1) / 2, (c.y0 + c.y1) / 2, c.width / 2) for c in circles]
+    for text, box in text_boxes(ax).items():
+        for block in blocks:
+            inside = all(block.contains(*corner) for corner in box.corners())
+            assert inside or not box.overlaps(block), text
+        for x, y, radius in circles:
+            nearest = np.clip(x, box.x0, box.x1), np.clip(y, box.y0, box.y1)
+            assert np.hypot(nearest[0] - x, nearest[1] - y) > radius, text
+
+
+@pytest.mark.parametrize("size", [(8.0, 4.2), (5.0, 3.0)])
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_no_line_and_no_arrow_head_runs_through_a_text(name, size):
+    _, ax = rendered(LAYOUTS[name], size)
+    lines = [line for line in ax.lines if line.zorder >= 1]  # what lies below is covered
+    tips = [p.get_window_extent() for p in ax.patches if isinstance(p, Polygon)]
+    tips = [box for box in tips if box.width < 30 and box.height < 30]
+    for text, box in text_boxes(ax).items():
+        for line in lines:
+            path = ax.transData.transform_path(line.get_path())
+            assert not path.intersects_bbox(box, filled=False), text
+        assert not any(box.overlaps(tip) for tip in tips), text
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_text_on_a_phone_has_at_least_eight_pixels(name):
+    """390 pixels wide, drawn for 8 inches: 8 px is what the smallest system fonts use."""
+    _, ax = rendered(LAYOUTS[name], (8.0, 4.2))
+    if name != "feedback, long texts":
+        assert min(t.get_fontsize() for t in ax.texts) / 72 * 390 / 8 >= 8.0
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_all_text_is_readable_in_grey(name):
+    """4.5:1 is the accessibility guidelines' threshold for body text (WCAG 2, level AA)."""
+    _, ax = rendered(LAYOUTS[name])
+    for text in ax.texts:
+        for fill in (diagrams.PAPER, diagrams.PLANT, diagrams.FOCUS):
+            assert contrast(text.get_color(), fill) >= 4.5
+
+
+def test_fills_differ_in_grey():
+    """Outlines do the work; the tints of machine and controller only must not fall together."""
+    for one, other in combinations((diagrams.PAPER, diagrams.PLANT, diagrams.FOCUS), 2):
+        assert contrast(one, other) > 1.15
+
+
+def test_a_drawing_keeps_its_scale_when_the_figure_is_large():
+    _, small = rendered(feedback, (8.0, 4.0))
+    _, large = rendered(feedback, (16.0, 8.0))
+    assert {t.get_fontsize() for t in small.texts} == {t.get_fontsize() for t in large.texts}
+
+
+def test_text_and_drawing_shrink_together():
+    sizes = {}
+    for width in (4.0, 2.0):
+        figure, ax = rendered(cascade, (width, width / 2))
+        unit = np.ptp(ax.transData.transform([(0, 0), (1, 0)])[:, 0])
+        sizes[width] = ax.texts[0].get_fontsize() * figure.dpi / unit
+    assert sizes[4.0] == pytest.approx(sizes[2.0], rel=1e-6)
+
+
+# --- the milling machine -------------------------------------------------------------------------
+
+
+def test_milling_names_every_part_of_the_loop():
+    _, ax = rendered(diagrams.draw_milling_setup)
+    words = " ".join(t.get_text().replace("\n", " ") for t in ax.texts)
+    parts = ("four-flute", "3/8 in", "600 rpm", "runout", "spindle axis", "workpiece", "feed")
+    chain = ("dynamometer", "force", "30 Hz", "60 Hz", "computer", "mV", "CNC table")
+    assert [part for part in (*parts, *chain) if part not in words] == []
+
+
+def test_cutter_and_workpiece_do_not_overlap():
+    """The edge is what all past positions left, so it cannot enter the circle of the tips."""
+    x = np.linspace(*diagrams._PIECE, 2000)
+    axis = diagrams._cutter_axis()
+    distance = np.hypot(x - axis[0], diagrams._cut_edge(x) - axis[1])
+    assert distance.min() == pytest.approx(diagrams._CUTTER, abs=1e-6)
+    assert distance.min() >= diagrams._CUTTER - 1e-9
+
+
+def test_the_drawn_edge_repeats_once_per_turn():
+    """A turn behind the cutter, where it no longer cuts; the grid has 200 positions per turn."""
+    x = np.linspace(diagrams._SPINDLE[0] + diagrams._TURN, 6.4, 400)
+    one_turn_on = diagrams._cut_edge(x + diagrams._TURN)
+    np.testing.assert_allclose(diagrams._cut_edge(x), one_turn_on, atol=1e-9)
+
+
+def profile(eccentricity):
+    _, ax = plt.subplots()
+    diagrams.draw_waviness(ax, eccentricity, 190e-6, 4.76e-3)
+    return ax.lines[0].get_xydata().T
+
+
+def test_without_runout_every_tooth_leaves_a_scallop():
+    """Depth of an arc of radius R and chord f/4: R - sqrt(R^2 - (f/8)^2), drawn in micrometres."""
+    _, height = profile(0.0)
+    depth = 1e6 * (4.76e-3 - np.sqrt(4.76e-3**2 - (190e-6 / 8) ** 2))
+    assert np.ptp(height) == pytest.approx(depth, rel=1e-6)
+
+
+def test_with_runout_the_longest_tooth_leaves_one_wave_per_turn():
+    """The next tooth is 5 um shorter and the wave only 0.95 um high: one tooth in four cuts."""
+    x, height = profile(5e-6)
+    depth = 1e6 * (4.765e-3 - np.sqrt(4.765e-3**2 - (190e-6 / 2) ** 2))
+    assert np.ptp(height) == pytest.approx(depth, rel=1e-6)
+    period = int(np.argmin(abs(x - 0.190)))
+    np.testing.assert_allclose(height[:-period], height[period:], atol=1e-6)
+
+
+def test_a_profile_longer_than_the_cutter_is_refused():
+    _, ax = plt.subplots()
+    with pytest.raises(ValueError, match=r"radius 0.005 m .* draw fewer turns"):
+        diagrams.draw_waviness(ax, 0.0, 0.19, 5e-3)
+
+
+# --- the style -----------------------------------------------------------------------------------
+
+
+def test_curves_of_the_cycle_differ_in_colour_and_neighbours_in_line_style():
+    cycle = list(plt.rcParams["axes.prop_cycle"])
+    assert len({c["color"] for c in cycle}) == len(cycle)
+    assert len({c["linestyle"] for c in cycle[:4]}) == 4
+    assert all(a["linestyle"] != b["linestyle"] for a, b in pairwise(cycle))
+
+
+def test_the_first_four_curves_stand_out_from_white_paper():
+    """3:1 is the accessibility guidelines' threshold for graphics (WCAG 2.1, 1.4.11)."""
+    cycle = list(plt.rcParams["axes.prop_cycle"])
+    assert min(contrast(c["color"], "white") for c in cycle[:4]) >= 3.0
+
+
+def test_fonts_are_those_that_ship_with_matplotlib():
+    assert plt.rcParams["font.sans-serif"] == ["DejaVu Sans"]
+    assert plt.rcParams["mathtext.fontset"] == "dejavusans"
+
+
+def test_the_same_drawing_gives_the_same_file(tmp_path):
+    for name in ("first.svg", "second.svg"):
+        figure, _ = rendered.__wrapped__(diagrams.draw_milling_setup)
+        figure.savefig(tmp_path / name, metadata={"Date": None})
+    assert (tmp_path / "first.svg").read_bytes() == (tmp_path / "second.svg").read_bytes()
+
+
+def test_blocks_grow_with_their_text():
+    _, ax = plt.subplots()
+    fraction = r"$\dfrac{z^{-d}\,Q(z^{-1})}{P(z^{-1})}$"
+    items = [Block("a", "PI"), Block("b", "repetitive controller", (4, 0)), Block("c", fraction)]
+    draw_block_diagram(ax, items, [])
+    (_, _, a, low), (_, _, b, _), (_, _, _, high) = outlines(ax)[0]
+    assert a < b
+    assert low < high
