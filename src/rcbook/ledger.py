@@ -29,6 +29,8 @@ NOT_COMPUTABLE = "not computable"
 VERDICTS = (REPRODUCED, CORRECTED, NOT_REPRODUCED, NOT_COMPUTABLE)
 KINDS = ("number", "list", "bound", "statement", "measurement")
 
+_LONG = 8  # a longer list is shown by its ends
+
 _NUMBER = r"[+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?"
 _ONE_SIDED = re.compile(rf"([<>])({_NUMBER})")
 _SYMMETRIC = re.compile(rf"\+-({_NUMBER})")
@@ -358,6 +360,8 @@ def show_value(computed: object) -> str:
             mended = "; corrected, it holds" if computed.get("holds_corrected") else ""
             return show_value(computed["holds"]) + mended
         return ", ".join(f"{name} {show_value(part)}" for name, part in computed.items())
+    if isinstance(computed, list) and len(computed) > _LONG:
+        return f"{min(computed):.6g} to {max(computed):.6g} ({len(computed)} values)"
     if isinstance(computed, list):
         return "; ".join(show_value(part) for part in computed)
     return f"{computed:.6g}"

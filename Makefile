@@ -1,0 +1,36 @@
+# make book: set up, execute every notebook, judge every claim, render book/_build/html/index.html
+# make test: set up, run the test suite        make check: as `book`, without rendering
+# PYTHON=/path/to/python3.12 chooses the interpreter.
+
+.PHONY: book test check clean
+.DELETE_ON_ERROR:
+
+book: .venv/ready
+	.venv/bin/python -m rcbook.cli build
+
+check: .venv/ready
+	.venv/bin/python -m rcbook.cli check
+
+test: .venv/ready
+	.venv/bin/python -m pytest
+
+clean:
+	rm -rf .venv book/_build
+
+CANDIDATES = $(or $(PYTHON),python3.11 python3.12 python3.13 python3 python)
+FITS = import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info < (3, 14))
+
+# A candidate is run and asked, since a name on the path need not be an interpreter that works.
+# The marker is made last, so a set-up that was interrupted is made again from nothing.
+.venv/ready: environment.txt pyproject.toml
+	@for python in $(CANDIDATES); do \
+	  if "$$python" -c '$(FITS)' >/dev/null 2>&1; then \
+	    rm -rf .venv && echo "setting up .venv with $$("$$python" --version) (once)" && \
+	    "$$python" -m venv .venv && exit 0; rm -rf .venv; exit 1; \
+	  fi; \
+	done; \
+	echo "rcbook needs Python 3.11, 3.12 or 3.13 with venv; none found among: $(CANDIDATES)" >&2; \
+	exit 1
+	.venv/bin/python -m pip install --disable-pip-version-check --require-hashes -r environment.txt
+	.venv/bin/python -m pip install --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@

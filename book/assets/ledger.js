@@ -1,0 +1,41 @@
+// Filters the table of the ledger page by paper, verdict and free text; without this script the
+// page shows every claim.
+"use strict";
+
+function filterLedger(form, rows) {
+  const { paper, verdict, text } = form.elements;
+  const words = text.value.toLowerCase().split(/\s+/).filter(Boolean);
+  let shown = 0;
+  for (const row of rows) {
+    const keep =
+      (!paper.value || row.dataset.paper === paper.value) &&
+      (!verdict.value || row.dataset.verdict === verdict.value) &&
+      words.every((word) => row.textContent.toLowerCase().includes(word));
+    row.hidden = !keep;
+    shown += keep ? 1 : 0;
+  }
+  form.querySelector("output").textContent = `${shown} of ${rows.length} claims`;
+}
+
+function startLedger() {
+  const form = document.querySelector("form.rcbook-filter");
+  if (!form) return;
+  const rows = [...document.querySelectorAll("table.rcbook-full tbody tr")];
+  const asked = new URLSearchParams(window.location.search);
+  for (const name of ["paper", "verdict", "text"]) {
+    if (asked.has(name)) form.elements[name].value = asked.get(name);
+  }
+  const update = () => filterLedger(form, rows);
+  form.addEventListener("input", update);
+  form.addEventListener("submit", (event) => event.preventDefault());
+  form.addEventListener("reset", () => setTimeout(update)); // after the fields are empty
+  // Whoever follows a link to one claim must see it.
+  window.addEventListener("hashchange", () => {
+    const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    if (target && target.hidden) form.reset();
+  });
+  form.hidden = false;
+  update();
+}
+
+startLedger();

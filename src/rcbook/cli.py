@@ -1,0 +1,126 @@
+"""The command `rcbook`: build the book, check its claims, print its ledger."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import signal
+import sys
+from collections.abc import Sequence
+from importlib import metadata
+from pathlib import Path
+
+# What executes and renders is imported where it is used: `rcbook --help` must not wait for it.
+
+OK, FAILED, USAGE, INTERRUPTED = 0, 1, 2, 130
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status: 0 fine, 1 failed, 2 usage, 130 Ctrl-C."""
+    for stream in (sys.stdout, sys.stderr):  # a C locale must not stop us from printing µ
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(encoding="utf-8", errors="replace")
+    # Whoever stops us by SIGTERM gets the clean-up that Ctrl-C gets.
+    signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
+    arguments = _parser().parse_args(argv)
+    try:
+        return arguments.run(arguments)
+    except KeyboardInterrupt:
+        print("interrupted; nothing was changed", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:  # `rcbook ledger | head`
+        sys.stderr.close()
+        return OK
+    except ModuleNotFoundError as error:
+        print(f"rcbook: {error.name} is missing; pip install 'rcbook[book]'", file=sys.stderr)
+    except ValueError as error:
+        print(f"rcbook: {error}", file=sys.stderr)
+    return FAILED
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="rcbook", description=__doc__)
+    parser.add_argument("--version", action="version", version=metadata.version("rcbook"))
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    build = commands.add_parser("build", help="execute, judge and render to book/_build/html")
+    build.set_defaults(run=_build)
+    check = commands.add_parser("check", help="execute and judge; exit 1 when a verdict flips")
+    check.set_defaults(run=_check)
+    show = commands.add_parser("ledger", help="print the ledger of the last run")
+    show.add_argument("--json", action="store_true", help="as a list of objects")
+    show.add_argument("--paper", metavar="KEY", help="only this paper, such as horng1989")
+    show.set_defaults(run=_ledger)
+    return parser
+
+
+def _check(_) -> int:
+    from rcbook import run
+    from rcbook.project import find
+
+    return OK if run.check(find(Path.cwd())).ok else FAILED
+
+
+def _build(_) -> int:
+    from rcbook import render, run
+    from rcbook.project import find
+
+    project = find(Path.cwd())
+    judged = run.check(project)
+    if not judged.ok:
+        print("the book was not rendered")
+        return FAILED
+    print("rendering the book ...", flush=True)
+    try:
+        print(f"open {render.render(project, judged)}")
+    except render.RenderError as error:
+        print(f"rcbook: {error}", file=sys.stderr)
+        return FAILED
+    return OK
+
+
+def _ledger(arguments: argparse.Namespace) -> int:
+    from rcbook import ledger
+    from rcbook.project import find
+
+    if arguments.paper not in (None, *ledger.papers()):
+        known = ", ".join(ledger.papers())
+        print(f"rcbook: no paper {arguments.paper!r}; choose one of {known}", file=sys.stderr)
+        return USAGE
+    file = find(Path.cwd()).ledger_file
+    if not file.is_file():
+        raise ValueError("there is no ledger yet; run `rcbook check` first")
+    rows = json.loads(file.read_text(encoding="utf-8"))
+    rows = [row for row in rows if arguments.paper in (None, row["paper"])]
+    if arguments.json:
+        sys.stdout.write(ledger.dumps(rows))
+    else:
+        _print_table(rows)
+    return OK
+
+
+def _print_table(rows: Sequence[dict]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from rcbook import pages
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column("claim", min_width=max((len(row["id"]) for row in rows), default=5))
+    for name in ("printed", "ours", "verdict", "reason"):
+        table.add_column(name, overflow="fold")
+    for row in rows:
+        flip = "" if row["verdict"] == row["expected_verdict"] else " (NOT EXPECTED)"
+        shown = (
+            pages.printed(row),
+            ledger.show_value(row["computed"]),
+            row["verdict"] + flip,
+            row["reason"],
+        )
+        table.add_row(*(Text(cell) for cell in (row["id"], *shown)))  # brackets are no markup
+    Console(width=None if sys.stdout.isatty() else 160).print(table)
+    print(f"\n{pages.counts(rows)}")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

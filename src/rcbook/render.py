@@ -1,0 +1,116 @@
+"""Render the executed notebooks and the pages about their ledger to HTML."""
+
+from __future__ import annotations
+
+import base64
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+
+import nbformat
+
+from rcbook import ledger, pages
+from rcbook.project import Project
+from rcbook.run import Run, plain
+
+TAIL = 60  # lines of Sphinx's output shown when it fails
+_JUPYTER_BOOK = "from jupyter_book.cli.main import main; main()"  # it has no __main__
+_OPTIONS = ("-W", "-n", "--keep-going", "-q")
+
+
+class RenderError(Exception):
+    """The book was judged and could not be rendered."""
+
+
+def render(project: Project, run: Run) -> Path:
+    """Render the book of `run` into `project.html` and return its first page.
+
+    Raises RenderError with the tail of the renderer's output; the previous book then stays.
+    """
+    project.build.mkdir(parents=True, exist_ok=True)
+    stage = Path(tempfile.mkdtemp(prefix="stage-", dir=project.build))
+    try:
+        fill(stage, project, run)
+        _sphinx(stage)
+        swap(stage / "_build" / "html", project.html, stage / "previous")
+    finally:
+        shutil.rmtree(stage, ignore_errors=True)
+    return project.html / "index.html"
+
+
+def fill(stage: Path, project: Project, run: Run) -> None:
+    """Put everything the renderer reads into `stage`, an existing folder."""
+    ignore = shutil.ignore_patterns("_build")
+    shutil.copytree(project.book, stage, ignore=ignore, dirs_exist_ok=True)
+    (stage / "cover.png").write_bytes(cover(run.notebooks))
+    shutil.copy(mathjax(), stage / "assets")
+    (stage / "notebooks").mkdir()
+    for name, notebook in run.notebooks.items():
+        text = nbformat.writes(shown(notebook))
+        (stage / "notebooks" / name).write_text(text, encoding="utf-8")
+    for name, text in pages.pages(project.papers, run.rows).items():
+        (stage / name).write_text(text, encoding="utf-8")
+
+
+def cover(notebooks: Mapping[str, nbformat.NotebookNode]) -> bytes:
+    """The PNG that the code cell tagged `cover` shows.  Raises RenderError when there is none."""
+    for notebook in notebooks.values():
+        for cell in notebook.cells:
+            if "cover" in cell.metadata.get("tags", ()):
+                for output in cell.get("outputs", ()):
+                    if png := output.get("data", {}).get("image/png"):
+                        return base64.b64decode(png)
+    raise RenderError("the book has no cover: tag a code cell that shows one PNG with `cover`")
+
+
+def shown(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
+    """A copy of `notebook` for the renderer: ids in its ledgers link to the ledger page."""
+    notebook = nbformat.from_dict(notebook)
+    for cell in notebook.cells:
+        for output in cell.get("outputs", ()):
+            data = output.get("data", {})
+            data.pop(ledger.MIME, None)  # the renderer would warn of what it does not know
+            if 'class="rcbook-ledger"' in data.get("text/html", ""):
+                link = r'<a href="../ledger.html#\1"><code>\1</code></a>'
+                data["text/html"] = re.sub(r"<code>([\w.-]+)</code>", link, data["text/html"])
+    return notebook
+
+
+def mathjax() -> Path:
+    """The one self-contained MathJax file of the package that vendors it."""
+    files = metadata.files("sphinx-mathjax-offline") or ()
+    for file in files:
+        if file.name == "tex-svg-full.js":
+            return Path(file.locate())
+    raise RenderError("sphinx-mathjax-offline holds no tex-svg-full.js; install environment.txt")
+
+
+def _sphinx(stage: Path) -> None:
+    command = [sys.executable, "-c", _JUPYTER_BOOK, "build", str(stage), *_OPTIONS]
+    done = subprocess.run(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        encoding="utf-8",
+        errors="replace",
+    )
+    if done.returncode or not (stage / "_build" / "html" / "index.html").is_file():
+        tail = "\n".join(plain(done.stdout).splitlines()[-TAIL:])
+        raise RenderError(f"{tail}\nthe book could not be rendered; its output is above")
+
+
+def swap(new: Path, target: Path, aside: Path) -> None:
+    """Put the folder `new` in the place of `target`, which goes to `aside`; all or nothing."""
+    try:
+        if target.exists():
+            target.rename(aside)
+        new.rename(target)
+    except BaseException:  # also Ctrl-C between the two
+        if aside.exists() and not target.exists():
+            aside.rename(target)
+        raise

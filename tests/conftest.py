@@ -1,0 +1,115 @@
+"""Tiny projects to break, and the real book, built once for all tests that look at it."""
+
+import importlib.util
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import nbformat
+import pytest
+
+from rcbook import pages
+from rcbook.project import Project
+
+ROOT = Path(__file__).parents[1]
+
+FAKE_PAPER = """
+from rcbook.ledger import Claim, Ledger, Paper
+
+CLAIMS = (
+    Claim("fake.x", "fake", "eq. 1", "number", "The gain $k$ < 3.", "2.0", "N", "reproduced"),
+    Claim("fake.y", "fake", "eq. 2", "number", "A pole.", "0.5", "1", "reproduced with correction",
+          erratum="eq2", reason="plain reading gives {value}"),
+    Claim("fake.z", "fake", "fig. 3", "measurement", "A force.", "", "N", "not computable",
+          reason="measured"),
+)
+ERRATA = {
+    "eq2": {"where": "eq. 2", "printed": "$p$", "corrected": "$-p$", "why": "a sign"},
+    "pen": {"where": "p. 3", "printed": "runnout", "corrected": "runout", "why": "spelling"},
+}
+PAPER = Paper("fake", "A fake case", "Nobody, Nowhere, 1989.", "one.ipynb",
+              {"primary": "as printed"}, ERRATA, {claim.id: claim for claim in CLAIMS})
+ledger = Ledger(PAPER)
+"""
+LEDGER = """from fake_paper import ledger
+ledger.check("fake.x", 2.01)
+ledger.check("fake.y", -0.5, 0.5)
+ledger.check("fake.z")
+ledger"""
+COVER = "import matplotlib.pyplot as plt\nplt.plot([1, 4, 9])\nplt.show()"
+
+
+def write_notebook(path: Path, cells: list[str]) -> None:
+    """A notebook of a title and code cells; the cell that plots is the cover."""
+    code = [nbformat.v4.new_code_cell(source) for source in cells]
+    for cell in code:
+        if "plt.show" in cell.source:
+            cell.metadata.update(tags=["cover"], mystnb={"image": {"alt": "a curve"}})
+    title = nbformat.v4.new_markdown_cell(f"# The case {path.stem}\n\nWith $x^2$.")
+    nbformat.write(nbformat.v4.new_notebook(cells=[title, *code]), path)
+
+
+@pytest.fixture
+def make(tmp_path):
+    """Makes a project of the given notebooks, each a list of code cells, with one fake paper."""
+
+    def make(**notebooks: list[str]) -> Project:
+        folder = tmp_path / "notebooks"
+        folder.mkdir()
+        source = folder / "fake_paper.py"
+        source.write_text(FAKE_PAPER, encoding="utf-8")
+        spec = importlib.util.spec_from_file_location("fake_paper", source)
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        for name, cells in notebooks.items():
+            write_notebook(folder / f"{name}.ipynb", cells)
+        ignore = shutil.ignore_patterns("_build")
+        shutil.copytree(ROOT / "book", tmp_path / "book", ignore=ignore)
+        return Project(tmp_path, (module.PAPER,))
+
+    return make
+
+
+def alive(pid: int, patience: float = 5.0) -> bool:
+    """Whether process `pid` is still there after at most `patience` seconds."""
+    for _ in range(round(patience / 0.1)):
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return False
+        time.sleep(0.1)
+    return True
+
+
+@pytest.fixture(scope="session")
+def built(tmp_path_factory) -> Path:
+    """A copy of the project in which `rcbook build` has run: every notebook, every claim."""
+    root = tmp_path_factory.mktemp("project")
+    for folder in ("notebooks", "book"):
+        ignore = shutil.ignore_patterns("_build", ".ipynb_checkpoints")
+        shutil.copytree(ROOT / folder, root / folder, ignore=ignore)
+    command = [sys.executable, "-m", "rcbook.cli", "build"]
+    done = subprocess.run(command, cwd=root, text=True, capture_output=True, encoding="utf-8")
+    assert done.returncode == 0, done.stdout + done.stderr
+    return root
+
+
+@pytest.fixture(scope="session")
+def rows(built, request) -> list[dict]:
+    """The ledger of the built book."""
+    rows = json.loads((built / "book" / "_build" / "ledger.json").read_text(encoding="utf-8"))
+    request.config.stash[_COUNTS] = pages.counts(rows)
+    return rows
+
+
+_COUNTS = pytest.StashKey[str]()
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    """Print how many claims were judged."""
+    if counts := config.stash.get(_COUNTS, ""):
+        terminalreporter.write_line(f"ledger of this run: {counts}")

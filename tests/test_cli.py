@@ -1,0 +1,109 @@
+"""The command line: what it prints and its exit statuses."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+from conftest import COVER, LEDGER
+
+from rcbook import cli, ledger, pages, project, render, run
+
+
+@pytest.fixture
+def at(make, monkeypatch):
+    """Makes a fake project and stands in it."""
+
+    def at(**notebooks):
+        made = make(**notebooks)
+        monkeypatch.chdir(made.root)
+        monkeypatch.setattr(project, "find", lambda start: made)
+        monkeypatch.setattr(ledger, "papers", lambda: ("fake", "other"))
+        return made
+
+    return at
+
+
+def test_check_and_ledger(at, capsys):
+    made = at(one=[LEDGER])
+    assert cli.main(["check"]) == 0
+    said = capsys.readouterr().out
+    assert "one.ipynb: done after" in said
+    assert "3 claims: 1 reproduced, 1 reproduced with correction, 0 not reproduced" in said
+    assert cli.main(["ledger"]) == 0
+    said = capsys.readouterr().out
+    assert "fake.x" in said
+    assert "2.01" in said
+    assert "3 claims:" in said
+    assert cli.main(["ledger", "--json"]) == 0
+    assert capsys.readouterr().out == made.ledger_file.read_text(encoding="utf-8")
+    assert cli.main(["ledger", "--json", "--paper", "other"]) == 0
+    assert json.loads(capsys.readouterr().out) == []
+
+
+def test_a_flip_fails_and_leaves_the_book(at, capsys):
+    made = at(one=[COVER, LEDGER.replace("2.01", "7")])
+    made.html.mkdir(parents=True)
+    (made.html / "index.html").write_text("old")
+    assert cli.main(["build"]) == 1
+    assert "the book was not rendered" in capsys.readouterr().out
+    assert (made.html / "index.html").read_text() == "old"
+    assert cli.main(["ledger"]) == 0
+    assert "NOT EXPECTED" in capsys.readouterr().out
+
+
+def test_build_says_why_it_could_not_render(at, capsys, monkeypatch):
+    at(one=[LEDGER])  # no cover
+    assert cli.main(["build"]) == 1
+    assert "the book has no cover" in capsys.readouterr().err
+    assert not list(run.Path.cwd().glob("book/_build/stage-*"))
+
+
+def test_a_ctrl_c_while_rendering_leaves_no_stage(at, capsys, monkeypatch):
+    def interrupted(stage):
+        raise KeyboardInterrupt
+
+    made = at(one=[COVER, LEDGER])
+    monkeypatch.setattr(render, "_sphinx", interrupted)
+    assert cli.main(["build"]) == 130
+    assert [path.name for path in made.build.iterdir()] == ["ledger.json"]
+
+
+def test_no_ledger_yet(at, capsys):
+    at(one=[LEDGER])
+    assert cli.main(["ledger"]) == 1
+    assert capsys.readouterr().err == "rcbook: there is no ledger yet; run `rcbook check` first\n"
+
+
+def test_wrong_use_is_status_2(at, capsys):
+    at(one=[LEDGER])
+    assert cli.main(["ledger", "--paper", "nobody"]) == 2
+    assert "no paper 'nobody'; choose one of fake, other" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["bake"])
+    assert stop.value.code == 2
+
+
+@pytest.mark.parametrize("command", ["build", "check", "ledger"])
+def test_outside_of_a_clone_there_is_one_clear_line(tmp_path, monkeypatch, capsys, command):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main([command]) == 1
+    assert capsys.readouterr().err == (
+        f"rcbook: no checkout of rcbook at or above {tmp_path}; run this inside a clone\n"
+    )
+
+
+def test_help_does_not_wait_for_heavy_imports():
+    code = (
+        "import sys, rcbook.cli; rcbook.cli._parser();"
+        "print([m for m in ('numpy', 'matplotlib', 'nbclient', 'rich') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_long_lists_are_shown_by_their_ends():
+    row = {"computed": [3.0, -1.5, *[0.0] * 20]}
+    assert pages.ours(row) == "-1.5 to 3 (22 values)"
+    assert pages.ours({"computed": [1.0, 2.0]}) == "1; 2"
+    assert pages.ours({"computed": None}) == "–"

@@ -1,0 +1,65 @@
+"""What can be said of the notebooks and the source without running them."""
+
+import ast
+import re
+import subprocess
+import sys
+
+import nbformat
+import pytest
+from conftest import ROOT
+
+NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
+LINES = 15  # a longer cell hides the idea; move the mechanism into the package
+
+DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+
+each = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+
+
+def code_cells(path):
+    return [c for c in nbformat.read(path, as_version=4).cells if c.cell_type == "code"]
+
+
+def test_there_is_a_notebook():
+    assert NOTEBOOKS
+
+
+@each
+def test_committed_without_outputs(path):
+    assert all(not c.outputs and c.execution_count is None for c in code_cells(path))
+
+
+@each
+def test_cell_ids_are_there_and_unique(path):
+    ids = [cell.get("id") for cell in nbformat.read(path, as_version=4).cells]
+    assert all(ids)
+    assert len(set(ids)) == len(ids)
+
+
+@each
+def test_cells_are_short_and_hold_no_mechanism(path):
+    """An experiment may have a name; what is longer, or has state, is in the package."""
+    for cell in code_cells(path):
+        assert len(cell.source.splitlines()) < LINES, cell.source
+        defined = [n for n in ast.walk(ast.parse(cell.source)) if isinstance(n, DEFINITIONS)]
+        assert not any(isinstance(node, ast.ClassDef) for node in defined), cell.id
+        assert all(node.end_lineno - node.lineno < 12 for node in defined), cell.id
+        assert len(defined) <= 1, cell.id
+
+
+@each
+def test_every_picture_has_words(path):
+    """A cell that draws carries an alternative text for those who cannot see it."""
+    for cell in code_cells(path):
+        if re.search(r"\bplt\.subplots\(|\bdraw_\w+\(", cell.source):
+            alt = cell.metadata.get("mystnb", {}).get("image", {}).get("alt", "")
+            assert len(alt) > 20, f"{cell.id}: {cell.source}"
+
+
+@pytest.mark.parametrize("command", [["check"], ["format", "--check"]], ids=["lint", "format"])
+def test_ruff(command):
+    done = subprocess.run(
+        [sys.executable, "-m", "ruff", *command, "."], cwd=ROOT, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr

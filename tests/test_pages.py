@@ -1,0 +1,203 @@
+"""The rendered book in a browser, from `file://` and with no network."""
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import sync_playwright
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+# No sandbox: continuous integration runs as root.  The others keep the browser itself quiet.
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+SPHINX_ALONE = {"search.html"}  # made without a source of ours
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """A browser that is installed already; none is ever downloaded."""
+    found = [path for name in NAMES if (path := shutil.which(name))]
+    if not found:
+        pytest.skip(f"no browser found; install one of {', '.join(NAMES)}")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=found[0], args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def visit(browser, built):
+    """Opens a page of the book; requests to other hosts and errors are collected and refused."""
+    contexts, trouble = [], []
+
+    def visit(page: str, width: int = 1400, scheme: str = "light"):
+        context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+        contexts.append(context)
+        context.route(re.compile("^(https?|wss?):"), lambda route: refuse(route))
+        tab = context.new_page()
+        tab.on("console", lambda m: m.type == "error" and trouble.append(f"{page}: {m.text}"))
+        tab.on("pageerror", lambda error: trouble.append(f"{page}: {error}"))
+        tab.goto((built / "book" / "_build" / "html").as_uri() + "/" + page)
+        tab.wait_for_function("window.MathJax?.startup ? true : !window.MathJax")
+        tab.evaluate("window.MathJax?.startup?.promise")
+        return tab
+
+    def refuse(route):
+        trouble.append(f"asks {route.request.url}")
+        route.abort()
+
+    yield visit
+    for context in contexts:
+        context.close()
+    assert not trouble
+
+
+def pages(built: Path) -> list[str]:
+    html = built / "book" / "_build" / "html"
+    found = [path.relative_to(html) for path in html.rglob("*.html")]
+    return sorted(path.as_posix() for path in found if path.parts[0] != "_static")
+
+
+def test_every_page_loads_and_typesets(visit, built):
+    found = pages(built)
+    assert {"index.html", "ledger.html", "errata.html", "api.html", "bibliography.html"} <= {*found}
+    for page in found:
+        tab = visit(page)
+        assert tab.title(), page
+        if page not in SPHINX_ALONE:
+            assert tab.locator("article h1").count() == 1, page
+        shown = tab.locator("main").first.inner_text()
+        assert r"\(" not in shown, page
+        assert r"\[" not in shown, page
+        assert tab.locator("mjx-merror").count() == 0, page
+
+
+@pytest.mark.parametrize("page", ["index.html", "ledger.html", "errata.html"])
+def test_mathematics_is_drawn(visit, page):
+    assert visit(page).locator("mjx-container svg").count() > 0
+
+
+def test_no_page_names_a_script_style_or_picture_of_another_host(built):
+    html = built / "book" / "_build" / "html"
+    loads = re.compile(r"<(?:script|link|img|iframe|source)\b[^>]*(?:src|href)=\"(?:https?:)?//")
+    imports = re.compile(r"url\([\"']?(?:https?:)?//|@import\s+[\"'](?:https?:)?//")
+    for path in html.rglob("*.html"):
+        assert not loads.search(path.read_text(encoding="utf-8")), path
+    for path in html.rglob("*.css"):
+        assert not imports.search(path.read_text(encoding="utf-8")), path
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_no_page_scrolls_sideways_on_a_phone(visit, built, scheme):
+    for page in pages(built):
+        tab = visit(page, width=390, scheme=scheme)
+        assert tab.evaluate("document.documentElement.scrollWidth") <= 390, page
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_stands_out_and_pictures_are_on_white(visit, scheme, built):
+    """Contrast of at least 7 between text and page, in either theme."""
+    tab = visit("ledger.html", scheme=scheme)
+    assert tab.evaluate("document.documentElement.dataset.theme") == scheme
+    colours = "e => [getComputedStyle(e).color, getComputedStyle(document.body).backgroundColor]"
+    ink, paper = tab.locator("table.rcbook-full td").first.evaluate(colours)
+    assert contrast(ink, paper) >= 7
+    tab = visit("index.html", scheme=scheme)
+    if scheme == "dark":
+        white = "e => getComputedStyle(e).backgroundColor"
+        assert tab.locator("main img").first.evaluate(white) == "rgb(255, 255, 255)"
+
+
+def contrast(ink: str, paper: str) -> float:
+    """Contrast ratio of two CSS colours, as WCAG 2 defines it."""
+
+    def luminance(colour: str) -> float:
+        parts = [int(part) / 255 for part in re.findall(r"\d+", colour)[:3]]
+        linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
+        return sum(w * p for w, p in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+
+    low, high = sorted((luminance(ink), luminance(paper)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_the_ledger_can_be_filtered(visit, rows):
+    tab = visit("ledger.html")
+    shown = tab.locator("table.rcbook-full tbody tr:visible")
+    count = tab.locator(".rcbook-filter output")
+    assert shown.count() == len(rows)
+    tab.get_by_label("Verdict").select_option("not reproduced")
+    expected = sum(row["verdict"] == "not reproduced" for row in rows)
+    assert shown.count() == expected
+    assert count.inner_text() == f"{expected} of {len(rows)} claims"
+    tab.get_by_role("button", name="Show all").click()
+    tab.wait_for_function("document.querySelectorAll('.rcbook-full tr[hidden]').length === 0")
+    tab.get_by_label("Text").fill(rows[0]["id"])
+    assert shown.first.get_attribute("id") == rows[0]["id"]
+    assert shown.count() < len(rows)
+
+
+def test_the_scoreboard_leads_to_the_filtered_ledger(visit, rows):
+    tab = visit("index.html")
+    first = tab.locator("table.rcbook-score tbody td a").first
+    count = int(first.inner_text())
+    first.click()
+    tab.wait_for_selector(".rcbook-filter:not([hidden])")
+    assert tab.locator("table.rcbook-full tbody tr:visible").count() == count
+
+
+def test_the_filter_works_from_the_keyboard(visit, rows):
+    tab = visit("ledger.html")
+    tab.get_by_label("Paper").focus()
+    tab.keyboard.press("Tab")
+    tab.keyboard.press("Tab")
+    tab.keyboard.type("no such words anywhere")
+    assert tab.locator("table.rcbook-full tbody tr:visible").count() == 0
+    tab.keyboard.press("Tab")
+    tab.keyboard.press("Enter")
+    tab.wait_for_function("document.querySelectorAll('.rcbook-full tr[hidden]').length === 0")
+
+
+def test_without_scripts_the_ledger_shows_every_claim(browser, built, rows):
+    context = browser.new_context(java_script_enabled=False)
+    tab = context.new_page()
+    tab.goto((built / "book" / "_build" / "html" / "ledger.html").as_uri())
+    assert tab.locator("table.rcbook-full tbody tr:visible").count() == len(rows)
+    assert not tab.locator(".rcbook-filter").is_visible()
+    context.close()
+
+
+def test_every_link_inside_the_book_leads_somewhere(visit, built):
+    """Our raw HTML links are not seen by the renderer, so they are followed here."""
+    html = built / "book" / "_build" / "html"
+    links = "links => links.map(link => link.href)"
+    targets = set()
+    for page in ("index.html", "ledger.html", "errata.html"):
+        targets |= set(visit(page).locator("article a[href]").evaluate_all(links))
+    for target in targets:
+        if target.startswith(html.as_uri()):
+            name, _, anchor = target.removeprefix(html.as_uri() + "/").partition("#")
+            path = html / name.partition("?")[0]
+            assert path.is_file(), target
+            if anchor:
+                assert f'id="{anchor}"' in path.read_text(encoding="utf-8"), target
+
+
+def test_every_picture_has_words(visit, built):
+    for page in {*pages(built)} - SPHINX_ALONE:
+        alts = "images => images.map(image => image.getAttribute('alt') || '')"
+        for alt in visit(page).locator("article img").evaluate_all(alts):
+            assert len(alt) > 10, page
+            assert not alt.startswith("_images"), page
+
+
+def test_search_finds_from_a_folder(visit):
+    tab = visit("search.html?q=runout")
+    tab.wait_for_selector("#search-results li a", timeout=15_000)
