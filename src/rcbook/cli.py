@@ -103,7 +103,7 @@ def _print_table(rows: Sequence[dict]) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from rcbook import pages
+    from rcbook import ledger, pages
 
     table = Table(box=None, pad_edge=False)
     table.add_column("claim", min_width=max((len(row["id"]) for row in rows), default=5))

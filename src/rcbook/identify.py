@@ -9,7 +9,7 @@ import scipy.signal
 from numpy.typing import ArrayLike
 
 from rcbook.signals import signal
-from rcbook.zdomain import Plant, whole_number
+from rcbook.zdomain import Plant, real_number, whole_number
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,16 +57,18 @@ def arx(u: ArrayLike, y: ArrayLike, na: int, nb: int, delay: int = 1) -> ArxFit:
         raise ValueError(f"{y.size} samples cannot fit {na + nb} parameters; take a longer record")
     phi = regressors(u, y, na, nb, delay)
     target = y[first:]
-    theta, _, rank, _ = np.linalg.lstsq(phi, target)
+    scale = np.linalg.norm(phi, axis=0)  # columns have units of their own
+    scale[scale == 0] = 1.0
+    theta, _, rank, _ = np.linalg.lstsq(phi / scale, target)
     if rank < na + nb:
         raise ValueError(
             f"the record excites {rank} of {na + nb} parameters; use a richer input or lower orders"
         )
-    residual = target - phi @ theta
+    residual = target - phi @ (theta / scale)
     variance = residual @ residual / (target.size - theta.size)
-    r = np.linalg.qr(phi, mode="r")
-    covariance = variance * np.linalg.inv(r.T @ r)
-    return ArxFit(theta, np.sqrt(np.diag(covariance)), residual, na, delay)
+    root = np.linalg.inv(np.linalg.qr(phi / scale, mode="r"))  # of the inverse normal matrix
+    error = np.sqrt(variance * np.sum(root**2, axis=1))
+    return ArxFit(theta / scale, error / scale, residual, na, delay)
 
 
 def prbs(bits: int, amplitude: float = 1.0, seed: int = 0) -> np.ndarray:
@@ -75,7 +77,8 @@ def prbs(bits: int, amplitude: float = 1.0, seed: int = 0) -> np.ndarray:
     The seed chooses the start of the shift register, that is, where the period begins.
     Raises ValueError for register lengths outside 2..32.
     """
-    if not 2 <= whole_number(bits, "bits") <= 32:
+    amplitude, bits = real_number(amplitude, "amplitude"), whole_number(bits, "bits", 0)
+    if not 2 <= bits <= 32:
         raise ValueError(f"bits = {bits} is outside the table of maximal registers, 2 to 32")
     state = np.zeros(bits, dtype=np.int8)
     while not state.any():

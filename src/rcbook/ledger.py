@@ -15,8 +15,8 @@ import re
 import string
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from decimal import Decimal
+from dataclasses import MISSING, dataclass, field, fields
+from decimal import Decimal, InvalidOperation
 from importlib import resources
 from numbers import Integral, Real
 
@@ -91,13 +91,25 @@ class Judgement:
 
 def half_width(printed: str) -> float:
     """Half a unit of the last printed digit of a number, `'0.8373'` giving 0.00005."""
-    return 0.5 * 10.0 ** Decimal(printed).as_tuple().exponent
+    return 0.5 * 10.0 ** _last_digit(printed)
 
 
 def truncate(value: float, printed: str) -> float:
     """`value` cut, not rounded, to as many decimals as `printed` has."""
-    unit = Decimal(1).scaleb(Decimal(printed).as_tuple().exponent)
+    unit = Decimal(1).scaleb(_last_digit(printed))
+    if not math.isfinite(value):
+        raise ValueError(f"{value!r} has no decimals to cut; give a finite number")
     return float(int(Decimal(repr(float(value))) / unit) * unit)
+
+
+def _last_digit(printed: str) -> int:
+    try:
+        exponent = Decimal(printed).as_tuple().exponent
+    except InvalidOperation:
+        exponent = "n"
+    if not isinstance(exponent, int):
+        raise ValueError(f"{printed!r} is not a printed number; give its digits, such as '0.8373'")
+    return exponent
 
 
 def papers() -> tuple[str, ...]:
@@ -117,15 +129,27 @@ def load(key: str) -> Paper:
     if not source.is_file():
         raise ValueError(f"no paper {key!r}; choose one of {', '.join(papers())}")
     data = tomllib.loads(source.read_text(encoding="utf-8"))
+    parts = ("title", "citation", "notebook", "conventions", "errata", "claims")
+    if absent := [part for part in parts if part not in data]:
+        raise ValueError(f"{key}.toml lacks {', '.join(absent)}; add them")
     claims: dict[str, Claim] = {}
     for entry in data["claims"]:
-        claim = Claim(paper=key, **entry)
+        claim = _claim(key, entry)
         if claim.id in claims:
             raise ValueError(f"{claim.id} stands twice in {key}.toml; remove one")
         _validate(claim, data["conventions"], data["errata"])
         claims[claim.id] = claim
-    head = (data[name] for name in ("title", "citation", "notebook", "conventions", "errata"))
-    return Paper(key, *head, claims)
+    return Paper(key, *(data[part] for part in parts[:-1]), claims)
+
+
+def _claim(paper: str, entry: Mapping) -> Claim:
+    known = {f.name: f.default is MISSING for f in fields(Claim) if f.name != "paper"}
+    name = entry.get("id", f"a claim of {paper} without id")
+    if unknown := entry.keys() - known:
+        raise ValueError(f"{name}: unknown field {', '.join(sorted(unknown))}; remove it")
+    if absent := [field for field, needed in known.items() if needed and field not in entry]:
+        raise ValueError(f"{name}: lacks {', '.join(absent)}; add it")
+    return Claim(paper=paper, **entry)
 
 
 def _validate(claim: Claim, conventions: Mapping, errata: Mapping) -> None:
@@ -142,16 +166,32 @@ def _validate(claim: Claim, conventions: Mapping, errata: Mapping) -> None:
         problem = f"erratum {claim.erratum!r} is not in [errata]"
     elif (claim.tolerance is not None) != bool(claim.tolerance_reason):
         problem = "a tolerance of its own needs a tolerance_reason, and the other way round"
+    elif claim.tolerance is not None and not 0 <= claim.tolerance < math.inf:
+        problem = f"tolerance {claim.tolerance!r} is not a finite number of 0 or more"
+    elif not isinstance(claim.printed, str) or not _readable(claim):
+        problem = f"printed {claim.printed!r} cannot be read as a {claim.kind} (digits in quotes)"
+    elif claim.tolerance is not None and tolerances(claim) is None:
+        problem = f"a tolerance means nothing for {claim.printed!r}"
     elif (claim.kind == "measurement") != (claim.expected == NOT_COMPUTABLE):
         problem = "a measurement, and nothing else, is not computable"
     elif claim.expected in (NOT_REPRODUCED, NOT_COMPUTABLE) and not claim.reason:
         problem = "it is expected to fail and gives no reason"
-    elif claim.expected == NOT_REPRODUCED and not _fields(claim.reason):
+    elif claim.expected == NOT_REPRODUCED and not _fields(claim.reason) - {"printed"}:
         problem = "its reason quotes nothing computed; put evidence in {braces}"
     elif claim.expected == CORRECTED and not claim.erratum and claim.convention == "primary":
         problem = "a correction names its erratum or its convention"
     if problem:
         raise ValueError(f"{claim.id}: {problem}")
+
+
+def _readable(claim: Claim) -> bool:
+    if claim.kind in ("number", "list"):
+        parts = claim.printed.split(";")
+        alone = claim.kind == "list" or len(parts) == 1
+        return alone and all(re.fullmatch(_NUMBER, part) for part in parts)
+    return claim.kind != "bound" or any(
+        pattern.fullmatch(claim.printed) for pattern in (_ONE_SIDED, _SYMMETRIC, _RANGE)
+    )
 
 
 def _fields(template: str) -> set[str]:
@@ -171,6 +211,8 @@ def agrees(claim: Claim, value: object) -> bool:
             raise ValueError(f"{claim.id} is a statement: give True or False, not {value!r}")
         return value
     values = value if isinstance(value, list) else [value]
+    if not values or any(isinstance(v, bool | list) for v in values):
+        raise ValueError(f"{claim.id}: give a number or a row of numbers, not {value!r}")
     if claim.kind == "bound":
         if match := _ONE_SIDED.fullmatch(claim.printed):
             sign = 1.0 if match[1] == "<" else -1.0
@@ -217,8 +259,14 @@ def judge(claim: Claim, value: object = None, corrected: object = None, **eviden
     that the claim's reason quotes; `value`, `corrected` and `printed` may be quoted as well.
     An infinite value says that what is printed does not exist; the evidence then stands for it.
     """
+    if claim.kind == "measurement" and (value is not None or corrected is not None):
+        raise ValueError(f"{claim.id} is a measurement: pass what it means as evidence")
+    if taken := evidence.keys() & {"holds", "holds_corrected", "plain", "printed"}:
+        raise ValueError(f"{claim.id}: evidence may not be called {', '.join(sorted(taken))}")
     value, corrected = _plain(claim, value), _plain(claim, corrected)
     evidence = {name: _plain(claim, item) for name, item in evidence.items()}
+    if deep := [name for name, item in evidence.items() if isinstance(item, list)]:
+        raise ValueError(f"{claim.id}: evidence {deep} is a list; name its numbers one by one")
     if claim.kind == "measurement":
         verdict, computed = NOT_COMPUTABLE, (evidence or None)
     elif value is None:
@@ -233,7 +281,8 @@ def judge(claim: Claim, value: object = None, corrected: object = None, **eviden
     if claim.kind == "statement":
         mended = {} if corrected is None else {"holds_corrected": corrected}
         computed = {"holds": value, **mended, **evidence}
-    known = {**evidence, "value": value, "corrected": corrected, "printed": claim.printed}
+    known = {**evidence, "value": value, "printed": claim.printed}
+    known |= {} if corrected is None else {"corrected": corrected}
     if absent := _fields(claim.reason) - known.keys():
         raise ValueError(f"{claim.id}: its reason quotes {sorted(absent)}; pass them as evidence")
     return Judgement(claim, computed, verdict, claim.reason.format(**known), evidence)
@@ -260,7 +309,7 @@ def _plain(claim: Claim, item: object) -> object:
 
 @dataclass(frozen=True)
 class Extract:
-    """Some rows of a ledger without their reasons; shown, it is a table and carries no verdicts."""
+    """Some rows of a ledger without reasons, to look at; only a `Ledger` delivers verdicts."""
 
     rows: Sequence[Mapping]
 
@@ -289,7 +338,7 @@ class Ledger:
         if id not in self.paper.claims:
             raise ValueError(f"{self.paper.key} has no claim {id!r}; see papers/*.toml")
         self.judgements[id] = judge(self.paper.claims[id], value, corrected, **evidence)
-        self._fresh.append(id)
+        self._fresh[:] = [*(fresh for fresh in self._fresh if fresh != id), id]
         return self.judgements[id]
 
     def missing(self) -> list[str]:

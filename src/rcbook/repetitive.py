@@ -6,9 +6,9 @@ Signals, with the symbols used throughout::
         -^                                          -^                                     |
          |-------------------------------------------|-------------(+ noise)---------------|
 
-r reference, e error, u output of the repetitive controller, v command to the plant, w disturbance
-at the plant input, y output.  In a *cascade* u alone is the reference of the inner loop; in the
-*plug-in* form it is added to r.
+r reference, e error, u reference of the inner loop, v command to the plant, w disturbance at the
+plant input, y output.  In a *cascade* u is what the repetitive controller makes of e; in the
+*plug-in* form r is added to it, and u (with its limit) is the sum.
 """
 
 from __future__ import annotations
@@ -40,12 +40,15 @@ class Process:
 
     def __post_init__(self) -> None:
         if self.plant.delay < 1:
-            raise ValueError("the plant answers without delay, an algebraic loop; give it delay 1")
+            raise ValueError(
+                f"delay = {self.plant.delay}: the plant answers at once, an algebraic loop; "
+                "give it one step of delay"
+            )
         if self.controller is None:
             return
         if self.controller.delay != 0:
             raise ValueError(f"controller delay {self.controller.delay}: put it into its b instead")
-        if not np.isclose(self.controller.dt, self.plant.dt, rtol=1e-9):
+        if not np.isclose(self.controller.dt, self.plant.dt, rtol=1e-9, atol=0):
             raise ValueError(
                 f"controller at {self.controller.dt} s, plant at {self.plant.dt} s; "
                 "sample both at the same interval"
@@ -75,8 +78,11 @@ class Process:
 def pi_controller(gain: float, alpha: float, dt: float) -> Plant:
     """PI controller gain (1 + alpha z^-1/(1 - z^-1)); alpha gain is the integral gain per sample.
 
-    Source: Horng (1989), eqs 9-10.
+    Source: Horng (1989), eqs 9-10.  Raises ValueError for a gain of zero, or one not finite.
     """
+    gain, alpha = zdomain.real_number(gain, "gain"), zdomain.real_number(alpha, "alpha")
+    if gain == 0:
+        raise ValueError("gain = 0: a controller that does nothing; leave it out")
     return Plant([gain, gain * (alpha - 1)], [1.0, -1.0], 0, dt)
 
 
@@ -95,14 +101,16 @@ class RepetitiveController:
     q: np.ndarray = field(default_factory=lambda: np.ones(1))
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "period", zdomain.whole_number(self.period, "period"))
+        mend = "choose a sampling rate that divides the turn evenly"
+        object.__setattr__(self, "period", zdomain.whole_number(self.period, "period", 1, mend))
         object.__setattr__(self, "q", zdomain.odd_symmetric(self.q))
-        if not (np.isfinite(self.gain) and self.gain > 0):
-            raise ValueError(f"repetitive gain {self.gain!r} must be positive and finite")
+        gain = zdomain.real_number(self.gain, "repetitive gain", positive=True)
+        object.__setattr__(self, "gain", gain)
         if self.delay < 0 or self.period <= self.q.size // 2:
             raise ValueError(
-                f"compensator and Q filter look {self.period - self.delay} samples ahead, more "
-                f"than the period of {self.period} holds; lengthen the period or shorten q"
+                f"compensator and Q filter look {self.period - self.delay} samples ahead and the "
+                f"memory needs one of its own, more than the period of {self.period} holds; "
+                "lengthen the period or shorten q"
             )
 
     @property
@@ -146,7 +154,9 @@ class Loop:
         return self.process.plant.dt
 
     def with_gain(self, gain: float) -> Loop:
-        """The same loop at another repetitive gain."""
+        """The same loop at another repetitive gain.  Raises ValueError when it has none."""
+        if self.repetitive is None:
+            raise ValueError("the loop has no repetitive controller; make one with `design`")
         return replace(self, repetitive=replace(self.repetitive, gain=gain))
 
     def _generator_parts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -227,7 +237,9 @@ def stable_gains(loop: Loop, highest: float = 100.0) -> list[tuple[float, float]
 
     Gains that put a root on the unit circle satisfy Im(n(z) conj(d(z))) = 0 there, an algebraic
     equation in z whose roots are found; a gain from each interval between them is then tested.
+    Raises ValueError when the loop has no repetitive controller.
     """
+    highest = zdomain.real_number(highest, "highest", positive=True)
     unit = loop.with_gain(1.0)
     ng, dg, _ = unit._generator_parts()
     path = unit.process.command_path
@@ -242,7 +254,7 @@ def stable_gains(loop: Loop, highest: float = 100.0) -> list[tuple[float, float]
     gains = np.unique(gains[np.isfinite(gains) & (gains > 0) & (gains < highest)])
     edges = np.concatenate([[0.0], gains, [highest]])
     edges = edges[np.append(True, np.diff(edges) > 1e-9)]
-    stable = [_radius_at(loop, k) < 1 for k in (edges[:-1] + edges[1:]) / 2]
+    stable = [_radius_at(loop, k) < 1 - _MARGINAL for k in (edges[:-1] + edges[1:]) / 2]
     return _merge(loop, edges, stable)
 
 
@@ -262,7 +274,10 @@ def _radius_at(loop: Loop, gain: float) -> float:
 
 
 def gain_limit(loop: Loop) -> float:
-    """Largest gain up to which the loop is stable from zero on; 0 when small gains are unstable."""
+    """Largest gain up to which the loop is stable from zero on; 0 when small gains are unstable.
+
+    A result of 100 means that the search of `stable_gains` found no end.
+    """
     intervals = stable_gains(loop)
     return intervals[0][1] if intervals and intervals[0][0] == 0 else 0.0
 
@@ -353,6 +368,7 @@ def simulate(
     keep_u, keep_v = repetitive_limit.remember_clipped, command_limit.remember_clipped
     lags = max(p.size for p in (ng, dg, through, a, b, n, c)) - 1
     y, e, u, v, inner, sent, memory_u, memory_v = np.zeros((8, lags + r.size))
+    wanted_u, wanted_v = np.zeros((2, lags + r.size))
     past_r, past_w = (np.concatenate([np.zeros(lags), s]) for s in (r, w))
 
     def recall(p: np.ndarray, s: np.ndarray, k: int, first: int = 0) -> float:
@@ -362,18 +378,18 @@ def simulate(
         y[k] = recall(b, sent, k) - recall(a, y, k, 1)
         measured = y[k] + noise[k - lags]
         e[k] = past_r[k] - measured
-        memory_u[k] = recall(ng, e, k) + recall(through, past_r, k) - recall(dg, memory_u, k, 1)
-        memory_u[k] /= dg[0]
-        u[k] = np.clip(memory_u[k], -repetitive_limit.value, repetitive_limit.value)
+        wanted = recall(ng, e, k) + recall(through, past_r, k) - recall(dg, memory_u, k, 1)
+        wanted_u[k] = wanted / dg[0]
+        u[k] = np.clip(wanted_u[k], -repetitive_limit.value, repetitive_limit.value)
         inner[k] = u[k] - feedback * measured
-        memory_v[k] = (recall(n, inner, k) - recall(c, memory_v, k, 1)) / c[0]
-        v[k] = np.clip(memory_v[k], -command_limit.value, command_limit.value)
-        memory_u[k] = u[k] if keep_u else memory_u[k]
-        memory_v[k] = v[k] if keep_v else memory_v[k]
+        wanted_v[k] = (recall(n, inner, k) - recall(c, memory_v, k, 1)) / c[0]
+        v[k] = np.clip(wanted_v[k], -command_limit.value, command_limit.value)
+        memory_u[k] = u[k] if keep_u else wanted_u[k]
+        memory_v[k] = v[k] if keep_v else wanted_v[k]
         sent[k] = v[k] + past_w[k]
     y, e, u, v = (s[lags:] for s in (y, e, u, v))
-    limited = ((v, command_limit), (u, repetitive_limit))
-    acted = [int(np.sum(np.abs(s) >= limit.value)) for s, limit in limited]
+    limited = ((wanted_v[lags:], command_limit), (wanted_u[lags:], repetitive_limit))
+    acted = [int(np.sum(np.abs(s) > limit.value)) for s, limit in limited]
     return Run(loop.dt, r, w, y, v, u, e, u - (y + noise), *acted)
 
 
@@ -433,6 +449,7 @@ def _value(fraction: tuple[np.ndarray, np.ndarray], z: np.ndarray) -> np.ndarray
 
 def frequency_response(loop: Loop, source: str, output: str, frequency: ArrayLike) -> np.ndarray:
     """Complex response from a source to an output at frequencies in Hz."""
+    frequency = signal(np.ravel(frequency), "frequency").reshape(np.shape(frequency))
     return _value(transfer(loop, source, output), zdomain.at_frequency(frequency, loop.dt))
 
 
@@ -452,6 +469,8 @@ def noise_gain(loop: Loop, output: str = "output") -> float:
     radius = max(stability(loop).spectral_radius, 0.5)
     n = int(np.ceil(np.log(1e-17) / np.log(radius))) + characteristic_polynomial(loop).size
     if n > 5_000_000:
-        raise ValueError(f"spectral radius {radius:.9g} is too near 1 to sum the response")
-    gain = np.abs(_value(transfer(loop, "noise", output), zdomain.unit_circle(n)))
-    return float(np.sqrt(np.mean(gain**2)))
+        raise ValueError(
+            f"spectral radius {radius:.9g} is too near 1 to sum the response; raise the gain"
+        )
+    numerator, denominator = (np.fft.fft(p, n) for p in transfer(loop, "noise", output))
+    return float(np.sqrt(np.mean(np.abs(numerator / denominator) ** 2)))

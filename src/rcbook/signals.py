@@ -5,13 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rcbook.zdomain import real_number, whole_number
+
 
 def signal(values: ArrayLike, name: str = "signal", length: int | None = None) -> np.ndarray:
     """Coerce to a 1-D float array of finite samples.
 
     Raises ValueError for another shape, another length, NaN or infinity.
     """
-    array = np.asarray(values, dtype=float)
+    array = np.asarray(values)
+    if np.iscomplexobj(array):
+        raise ValueError(f"{name} is complex; give real samples")
+    array = array.astype(float)  # a copy: the caller may go on using the record
     if array.ndim != 1 or array.size == 0:
         raise ValueError(f"{name} has shape {array.shape}; give one non-empty row of samples")
     if length is not None and array.size != length:
@@ -24,22 +29,26 @@ def signal(values: ArrayLike, name: str = "signal", length: int | None = None) -
 
 def step(height: float, n: int, start: int = 0) -> np.ndarray:
     """n samples: 0 before sample `start`, `height` from there on."""
-    return np.where(np.arange(n) >= start, float(height), 0.0)
+    late = np.arange(whole_number(n, "n")) >= whole_number(start, "start", 0)
+    return np.where(late, real_number(height, "height"), 0.0)
 
 
-def sinusoid(amplitude: float, frequency: float, dt: float, n: int, phase: float = 0.0):
+def sinusoid(
+    amplitude: float, frequency: float, dt: float, n: int, phase: float = 0.0
+) -> np.ndarray:
     """n samples of amplitude sin(2 pi frequency k dt + phase); frequency in Hz, phase in rad."""
-    return amplitude * np.sin(2 * np.pi * frequency * dt * np.arange(n) + phase)
+    angle = 2 * np.pi * frequency * dt * np.arange(whole_number(n, "n")) + phase
+    return signal(real_number(amplitude, "amplitude") * np.sin(angle), "sinusoid")
 
 
 def periodic(shape: ArrayLike, n: int) -> np.ndarray:
     """n samples of the periodic signal whose one period is `shape`."""
-    return np.resize(signal(shape, "shape"), n)
+    return np.resize(signal(shape, "shape"), whole_number(n, "n"))
 
 
 def random_period(period: int, amplitude: float, rng: np.random.Generator) -> np.ndarray:
     """One period of a random shape with zero mean, scaled so that max - min = 2 amplitude."""
-    shape = rng.standard_normal(period)
+    shape = rng.standard_normal(whole_number(period, "period", 2))
     shape -= shape.mean()
     return shape * 2 * amplitude / spread(shape)
 
@@ -57,9 +66,9 @@ def rms(y: ArrayLike) -> float:
 def overshoot(y: ArrayLike, target: float) -> float:
     """How far y exceeds a target of either sign, in percent of it; 0 when it never does.
 
-    Raises ValueError when the target is zero.
+    Raises ValueError when the target is zero or not finite.
     """
-    if target == 0:
+    if real_number(target, "target") == 0:
         raise ValueError("overshoot in percent needs a target other than 0")
     return max(0.0, 100 * float(np.max(signal(y) / target) - 1))
 
@@ -67,16 +76,18 @@ def overshoot(y: ArrayLike, target: float) -> float:
 def settling_time(y: ArrayLike, target: ArrayLike, band: float, dt: float) -> float:
     """Time in s of the last entry into |y - target| <= band, counted from the first sample.
 
-    It is the instant of the first sample after which no sample leaves the band; infinite when the
+    It is the instant of the first sample from which on no sample is outside; infinite when the
     last sample is still outside, because the record then does not show a settled response.
-    Raises ValueError when the band is not positive.
+    `target` is one value or a signal as long as y.
+    Raises ValueError when the band or dt is not positive, or y and the target do not fit.
     """
-    if not band > 0:
-        raise ValueError(f"band = {band!r} must be positive")
-    outside = np.flatnonzero(np.abs(signal(y) - target) > band)
+    y, band = signal(y, "y"), real_number(band, "band", positive=True)
+    dt = real_number(dt, "dt", positive=True)
+    target = np.full(y.size, float(target)) if np.ndim(target) == 0 else target
+    outside = np.flatnonzero(np.abs(y - signal(target, "target", y.size)) > band)
     if outside.size == 0:
         return 0.0
-    return np.inf if outside[-1] == len(y) - 1 else float((outside[-1] + 1) * dt)
+    return np.inf if outside[-1] == y.size - 1 else float((outside[-1] + 1) * dt)
 
 
 def harmonic(y: ArrayLike, period: int, order: int = 1) -> complex:
@@ -84,7 +95,7 @@ def harmonic(y: ArrayLike, period: int, order: int = 1) -> complex:
 
     y must hold whole periods; raises ValueError when it does not.
     """
-    y = signal(y)
+    y, period = signal(y), whole_number(period, "period")
     if y.size % period:
         raise ValueError(f"{y.size} samples are not whole periods of {period}; cut the record")
     k = np.arange(y.size)
@@ -93,5 +104,11 @@ def harmonic(y: ArrayLike, period: int, order: int = 1) -> complex:
 
 
 def phase_between(y: ArrayLike, x: ArrayLike, period: int) -> float:
-    """Phase of y relative to x at the fundamental, degrees from -180 to 180; a lag is negative."""
-    return float(np.degrees(np.angle(harmonic(y, period) / harmonic(x, period))))
+    """Phase of y relative to x at the fundamental, degrees from -180 to 180; a lag is negative.
+
+    Raises ValueError when either has no fundamental to speak of (below 1e-9 of its size).
+    """
+    ours, theirs = harmonic(y, period), harmonic(x, period)
+    if min(abs(ours) / (rms(y) or 1), abs(theirs) / (rms(x) or 1)) < 1e-9:
+        raise ValueError(f"no fundamental of period {period} in one of the signals: no phase")
+    return float(np.degrees(np.angle(ours / theirs)))

@@ -7,15 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from numbers import Integral
+from numbers import Integral, Real
 
 import control
 import numpy as np
-import scipy.signal
 from numpy.typing import ArrayLike
 
 NORMALISATIONS = ("peak", "dc", "l1")
-_ON_CIRCLE = 1e-9  # a root this close to the unit circle is taken to lie on it
+_ON_CIRCLE = 1e-9  # a pole this close to the unit circle is taken to lie on it
+# A zero of multiplicity m is known to eps^(1/m) only; keeping one that lies inside does no harm.
+_NEAR_CIRCLE = 1e-4
 
 
 def polynomial(coefficients: ArrayLike, name: str = "polynomial") -> np.ndarray:
@@ -23,7 +24,10 @@ def polynomial(coefficients: ArrayLike, name: str = "polynomial") -> np.ndarray:
 
     Raises ValueError when it is empty, has more than one axis, or holds NaN or infinity.
     """
-    array = np.array(coefficients, dtype=float, ndmin=1)
+    array = np.array(coefficients, ndmin=1)
+    if np.iscomplexobj(array):
+        raise ValueError(f"{name} = {array} is complex; give real coefficients")
+    array = array.astype(float)
     if array.ndim != 1 or array.size == 0:
         raise ValueError(f"{name} has shape {array.shape}; give one non-empty row of coefficients")
     if not np.all(np.isfinite(array)):
@@ -32,18 +36,27 @@ def polynomial(coefficients: ArrayLike, name: str = "polynomial") -> np.ndarray:
     return array
 
 
-def whole_number(value: object, name: str, least: int = 1) -> int:
+def whole_number(value: object, name: str, least: int = 1, mend: str = "round it") -> int:
     """Coerce to an int not below `least`; 6.0 is accepted, 6.4 is not.
 
     Raises ValueError otherwise.
     """
     whole = isinstance(value, Integral) or (isinstance(value, float) and value.is_integer())
     if not whole or isinstance(value, bool) or value < least:
-        raise ValueError(
-            f"{name} = {value!r} must be a whole number not below {least}; "
-            "choose a sampling rate that divides the turn evenly"
-        )
+        raise ValueError(f"{name} = {value!r} must be a whole number not below {least}; {mend}")
     return int(value)
+
+
+def real_number(value: object, name: str, positive: bool = False) -> float:
+    """Coerce to a finite float, a positive one if asked.
+
+    Raises ValueError otherwise.
+    """
+    fits = isinstance(value, Real) and not isinstance(value, bool) and np.isfinite(value)
+    if not fits or (positive and not value > 0):
+        kind = "positive" if positive else "real"
+        raise ValueError(f"{name} = {value!r} must be a {kind} finite number")
+    return float(value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +78,13 @@ class Plant:
             raise ValueError(f"a = {a} begins with 0: the plant is improper; drop the zero")
         if b[0] == 0:
             raise ValueError(f"b = {b} begins with 0; drop it and add one to the delay")
-        if not (np.isfinite(self.dt) and self.dt > 0):
-            raise ValueError(f"dt = {self.dt!r} s must be a positive sampling interval")
-        object.__setattr__(self, "b", polynomial(b / a[0]))
-        object.__setattr__(self, "a", polynomial(a / a[0]))
+        with np.errstate(over="ignore"):
+            b, scaled = b / a[0], a / a[0]
+        if not np.all(np.isfinite([*b, *scaled])):
+            raise ValueError(f"a = {a} begins too small to divide by; scale a and b up")
+        object.__setattr__(self, "dt", real_number(self.dt, "sampling interval dt", positive=True))
+        object.__setattr__(self, "b", polynomial(b))
+        object.__setattr__(self, "a", polynomial(scaled))
         object.__setattr__(self, "delay", whole_number(self.delay, "delay", least=0))
 
     @property
@@ -164,11 +180,12 @@ def response(plant: Plant | NoncausalFilter, z: ArrayLike) -> np.ndarray:
 def zero_order_hold(system: control.StateSpace | control.TransferFunction, dt: float) -> Plant:
     """Sample a continuous single-input single-output plant behind a zero-order hold.
 
-    Raises ValueError when the plant is not continuous, not proper or has several inputs or
+    The numerator comes from the impulse response, which keeps the digits of small leading
+    coefficients.
+    Raises ValueError when the plant is not continuous, not proper, zero or has several inputs or
     outputs, or dt is not positive.
     """
-    if not (np.isfinite(dt) and dt > 0):
-        raise ValueError(f"dt = {dt!r} s must be a positive sampling interval")
+    dt = real_number(dt, "sampling interval dt", positive=True)
     if not system.issiso():
         raise ValueError(f"{system.ninputs} inputs, {system.noutputs} outputs; pick one of each")
     if not system.isctime():
@@ -178,28 +195,36 @@ def zero_order_hold(system: control.StateSpace | control.TransferFunction, dt: f
         if num.size > den.size:
             raise ValueError(f"numerator degree {num.size - 1} exceeds {den.size - 1}: improper")
     sampled = control.sample_system(control.ss(system), dt, method="zoh")
-    b, a = scipy.signal.ss2tf(sampled.A, sampled.B, sampled.C, sampled.D)
-    significant = np.abs(b[0]) > 1e-12 * np.abs(b[0]).max()
-    delay = int(np.argmax(significant))
-    return Plant(b[0][delay:], a, delay, dt)
+    a = np.atleast_1d(np.poly(sampled.A)) if sampled.nstates else np.ones(1)
+    state, impulse = sampled.B, [sampled.D.item()]
+    for _ in range(sampled.nstates):
+        impulse.append((sampled.C @ state).item())
+        state = sampled.A @ state
+    b = np.convolve(a, impulse)[: a.size]
+    if not b.any():
+        raise ValueError("the plant is zero: its output does not answer to its input")
+    delay = int(np.flatnonzero(b)[0])
+    return Plant(b[delay:], a, delay, dt)
 
 
 def split_zeros(b: ArrayLike, radius: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Split b = B+ B-, B- monic with the zeros of magnitude `radius` or more.
 
-    Zeros on the unit circle go to B- whenever radius <= 1.
-    Raises ValueError when the radius is not positive, or so large that zeros on or outside the
-    unit circle would stay in B+ and be cancelled.
+    Zeros on the unit circle, or inside it by less than 1e-4, go to B- whenever radius <= 1.
+    Raises ValueError when b begins with 0, the radius is not positive, or it is so large that
+    zeros on or outside the unit circle would stay in B+ and be cancelled.
     """
     b = polynomial(b, "numerator b")
-    if not radius > 0:
-        raise ValueError(f"radius = {radius!r} must be positive")
+    if b[0] == 0:
+        raise ValueError(f"b = {b} begins with 0; drop it and count it as delay")
+    radius = real_number(radius, "radius", positive=True)
     zeros = np.roots(b)
-    kept = np.abs(zeros) >= radius - _ON_CIRCLE
+    kept = np.abs(zeros) >= radius - _NEAR_CIRCLE
     cancelled = zeros[~kept]
-    if np.any(np.abs(cancelled) >= 1 - _ON_CIRCLE):
+    if np.any(np.abs(cancelled) >= 1 - _NEAR_CIRCLE):
         raise ValueError(
-            f"radius = {radius!r} would cancel the zeros {cancelled[np.abs(cancelled) > 0.99]} "
+            f"radius = {radius!r} would cancel the zeros "
+            f"{cancelled[np.abs(cancelled) >= 1 - _NEAR_CIRCLE]} "
             "on or outside the unit circle; choose a radius of 1 or less"
         )
     b_plus = b[0] * np.atleast_1d(np.poly(cancelled)).real
@@ -281,11 +306,12 @@ def zero_phase_gain(taps: ArrayLike, z: ArrayLike) -> np.ndarray:
 def odd_symmetric(taps: ArrayLike) -> np.ndarray:
     """Coerce to a symmetric filter with a middle tap.
 
-    Raises ValueError when the number of taps is even or the two halves differ.
+    Raises ValueError when the number of taps is even or the two halves differ by more than
+    rounding.
     """
     taps = polynomial(taps, "Q filter")
-    if taps.size % 2 == 0 or not np.array_equal(taps, taps[::-1]):
+    if taps.size % 2 == 0 or not np.allclose(taps, taps[::-1], rtol=0, atol=1e-12):
         raise ValueError(
             f"Q filter {taps} must be symmetric about a middle tap; see zdomain.symmetric_fir"
         )
-    return taps
+    return polynomial((taps + taps[::-1]) / 2)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcbook import signals
-from rcbook.zdomain import Plant, add, multiply
+from rcbook.zdomain import Plant, add, multiply, real_number
 
 INCH = 25.4e-3  # m
 FAST_MODES = ("keep sign", "positive", "damped cosine")
@@ -32,8 +32,13 @@ class PeripheralMill:
 
     @property
     def samples_per_turn(self) -> int:
-        """N, samples per spindle revolution."""
-        return round(1 / (self.spindle_frequency * self.plant.dt))
+        """N, samples per spindle revolution.  Raises ValueError when it is no whole number."""
+        samples = 1 / (self.spindle_frequency * self.plant.dt)
+        if abs(samples - round(samples)) > 1e-9 * samples:
+            raise ValueError(
+                f"{samples:.6g} samples per turn is no whole number; change the spindle speed or dt"
+            )
+        return round(samples)
 
     def runout(self, n: int, amplitude: float | None = None) -> np.ndarray:
         """n samples, in mV, of the sinusoidal runout that one eccentric turn adds to the command.
@@ -64,15 +69,20 @@ def resample(plant: Plant, dt: float, fast_mode: str = "keep sign") -> Plant:
 
     A negative pole p has no real continuous counterpart; over a new interval of tau old ones it
     becomes -|p|^tau ("keep sign"), |p|^tau ("positive"), or the pair |p|^tau e^(+-j pi tau) of
-    a cosine that alternates at the old rate ("damped cosine").  Each keeps the gain of its mode,
-    and all are exact for tau = 1.
-    Raises ValueError for a delay other than 1, repeated or complex poles, or an unknown mode.
+    a cosine that alternates at the old rate ("damped cosine").  Each keeps the gain of its mode;
+    all but "positive" are exact for tau = 1.
+    Raises ValueError for a delay other than 1, a numerator as long as the denominator, poles that
+    are repeated, complex or 1, or an unknown mode.
     """
-    poles, tau = plant.poles, dt / plant.dt
-    if plant.delay != 1 or plant.b.size > poles.size:
+    poles, tau = plant.poles, real_number(dt, "dt", positive=True) / plant.dt
+    if plant.delay != 1:
         raise ValueError(f"delay {plant.delay}: only a plant of one delay step is resampled")
-    if np.iscomplexobj(poles) or np.unique(poles).size < poles.size or 0 in poles:
-        raise ValueError(f"poles {poles}: only distinct real poles are resampled mode by mode")
+    if plant.b.size > poles.size:
+        raise ValueError(f"numerator {plant.b} is too long for {poles.size} poles to be its modes")
+    if np.iscomplexobj(poles) or np.unique(poles).size < poles.size or {0, 1} & {*poles}:
+        raise ValueError(
+            f"poles {poles}: only distinct real poles other than 1 are resampled mode by mode"
+        )
     if fast_mode not in FAST_MODES:
         raise ValueError(f"fast_mode {fast_mode!r} is none of {', '.join(FAST_MODES)}")
     modes = [_mode(pole, tau, fast_mode, _mode_gain(plant, pole, poles)) for pole in poles]

@@ -1,0 +1,501 @@
+"""Verdicts follow from printed digits and tolerance, and from nothing else."""
+
+import json
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from rcbook import ledger
+from rcbook.ledger import Claim, Ledger, Paper, judge
+
+
+def claim(**fields):
+    base = {
+        "id": "paper.x",
+        "paper": "paper",
+        "where": "eq. 1",
+        "kind": "number",
+        "says": "a number",
+        "printed": "0.8373",
+        "unit": "",
+        "expected": ledger.REPRODUCED,
+    }
+    return Claim(**{**base, **fields})
+
+
+def bound(printed, **fields):
+    return claim(kind="bound", printed=printed, **fields)
+
+
+# ---- digits ----
+
+
+@pytest.mark.parametrize(
+    ("printed", "half"),
+    [
+        ("0.8373", Fraction(5, 100000)),
+        ("20", Fraction(1, 2)),
+        ("20.0", Fraction(5, 100)),
+        ("-0.5000", Fraction(5, 100000)),
+        ("+3", Fraction(1, 2)),
+        ("1.50e2", Fraction(1, 2)),
+        ("1e-3", Fraction(5, 10000)),
+        ("2E3", Fraction(500)),
+        ("0", Fraction(1, 2)),
+    ],
+)
+def test_half_width_is_half_a_unit_of_the_last_printed_digit(printed, half):
+    assert ledger.half_width(printed) == pytest.approx(float(half), rel=1e-15)
+
+
+@pytest.mark.parametrize("i", range(-130, 131))
+def test_truncate_keeps_a_number_that_has_no_more_decimals(i):
+    value = i / 100  # 0.29 * 100 = 28.999999999999996 is the trap
+    assert ledger.truncate(value, "0.00") == value
+
+
+@pytest.mark.parametrize(
+    ("value", "printed", "expected"),
+    [
+        (0.87999, "0.8731", 0.8799),
+        (0.28999, "0.28", 0.28),
+        (-0.28999, "0.28", -0.28),  # cut, not rounded down
+        (1.9999, "2", 1.0),
+        (-1.9999, "2", -1.0),
+        (0.00004, "0.0001", 0.0),
+        (123.456, "12", 123.0),
+        (1e-7, "0.01", 0.0),  # repr in scientific notation
+        (1.2345e20, "1.0", 1.2345e20),
+        (0.29 * 100, "29", 28.0),  # the float is below 29, and so says the cut
+    ],
+)
+def test_truncate_cuts_toward_zero(value, printed, expected):
+    assert ledger.truncate(value, printed) == expected
+
+
+# ---- verdicts ----
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("printed", ["0.8373", "-1.6234", "20", "16.7", "0"])
+def test_verdict_of_a_number_flips_just_beyond_half_a_digit(printed, sign):
+    half = ledger.half_width(printed)
+    inside, outside = (float(printed) + sign * half * f for f in (0.999999, 1.000001))
+    assert judge(claim(printed=printed), inside).verdict == ledger.REPRODUCED
+    assert judge(claim(printed=printed), outside).verdict == ledger.NOT_REPRODUCED
+
+
+def test_a_number_exactly_half_a_digit_away_is_reproduced():
+    assert judge(claim(printed="0.25"), 0.255).verdict == ledger.REPRODUCED
+    assert judge(claim(printed="3"), 3.5).verdict == ledger.REPRODUCED
+
+
+def test_a_tolerance_of_its_own_replaces_half_a_digit():
+    own = claim(printed="600", tolerance=20.0, tolerance_reason="about")
+    assert judge(own, 619.99).verdict == ledger.REPRODUCED
+    assert judge(own, 620.01).verdict == ledger.NOT_REPRODUCED
+    exact = claim(printed="6", tolerance=0.0, tolerance_reason="a count")
+    assert judge(exact, 6).verdict == ledger.REPRODUCED
+    assert judge(exact, 6.0001).verdict == ledger.NOT_REPRODUCED
+
+
+def test_a_list_is_judged_number_by_number_with_the_digits_of_each():
+    digits = claim(kind="list", printed="1;-1.1748;0.29")
+    assert judge(digits, [1.49, -1.17484, 0.2949]).verdict == ledger.REPRODUCED
+    for bad in ([1.51, -1.1748, 0.29], [1, -1.17486, 0.29], [1, -1.1748, 0.2951]):
+        assert judge(digits, bad).verdict == ledger.NOT_REPRODUCED
+    with pytest.raises(ValueError, match=r"3 number.*given 2"):
+        judge(digits, [1.0, -1.1748])
+
+
+@pytest.mark.parametrize(
+    ("printed", "good", "bad"),
+    [
+        ("<20", [19.999, -50.0], [20.0, 20.001]),
+        (">1.5", [1.5001, 1e9], [1.5, -2.0]),
+        ("<1e-3", [0.0009], [0.0011]),
+        (">-2", [-1.9], [-2.1]),
+        ("+-50", [50.0, -50.0, 0.0], [50.001, -50.001]),
+        ("+-0.3", [-0.3], [0.31]),
+    ],
+)
+def test_bounds_hold_up_to_their_edge(printed, good, bad):
+    for value in good:
+        assert judge(bound(printed), value).verdict == ledger.REPRODUCED, value
+    for value in bad:
+        assert judge(bound(printed), value).verdict == ledger.NOT_REPRODUCED, value
+
+
+def test_a_bound_holds_only_when_every_value_obeys():
+    assert judge(bound("<20"), [1.0, 19.0]).verdict == ledger.REPRODUCED
+    assert judge(bound("<20"), [1.0, 21.0]).verdict == ledger.NOT_REPRODUCED
+    assert judge(bound("+-50"), np.array([-49.0, 51.0])).verdict == ledger.NOT_REPRODUCED
+
+
+@pytest.mark.parametrize(
+    ("printed", "ends"),
+    [("0<k_r<2", (0, 2)), ("6<=N<=10", (6, 10)), ("0.6<k_r<1.4", (0.6, 1.4)), ("-1<=x<2", (-1, 2))],
+)
+def test_a_range_compares_its_two_ends(printed, ends):
+    low, high = ends
+    own = bound(printed, tolerance=0.01, tolerance_reason="a scan in steps of 0.02")
+    assert judge(own, [low + 0.0099, high - 0.0099]).verdict == ledger.REPRODUCED
+    assert judge(own, [low - 0.011, high]).verdict == ledger.NOT_REPRODUCED
+    assert judge(own, [low, high + 0.011]).verdict == ledger.NOT_REPRODUCED
+    with pytest.raises(ValueError, match="2 number"):
+        judge(own, low)
+
+
+@pytest.mark.parametrize("printed", ["about 20", "<=20", "20<", "0<k_r", "+-", "1<a b<2", ""])
+def test_a_bound_that_cannot_be_read_is_refused(printed):
+    with pytest.raises(ValueError, match="cannot read"):
+        judge(bound(printed), 1.0)
+
+
+def test_statements_are_true_or_false_and_nothing_else():
+    says = claim(kind="statement", printed="")
+    assert judge(says, True).verdict == judge(says, np.bool_(True)).verdict == ledger.REPRODUCED
+    assert judge(says, False).verdict == ledger.NOT_REPRODUCED
+    assert judge(says, np.array(3) > 2, margin=0.4).computed == {"holds": True, "margin": 0.4}
+    for value in (1, 0.0, [True], np.array([True, True])):
+        with pytest.raises(ValueError, match="True or False"):
+            judge(says, value)
+
+
+def test_corrected_route_is_taken_only_when_the_plain_reading_fails():
+    own = claim(expected=ledger.CORRECTED, erratum="eq25")
+    both = judge(own, 0.83731, corrected=0.83732)
+    assert (both.verdict, both.computed) == (ledger.REPRODUCED, 0.83731)
+    assert not both.as_expected
+    mended = judge(own, 0.9, corrected=0.83732)
+    assert (mended.verdict, mended.computed) == (ledger.CORRECTED, 0.83732)
+    assert mended.evidence["plain"] == 0.9 and mended.as_expected
+    neither = judge(own, 0.9, corrected=0.8)
+    assert (neither.verdict, neither.computed) == (ledger.NOT_REPRODUCED, 0.9)
+    statement = judge(claim(kind="statement", erratum="eq25"), False, corrected=True)
+    assert statement.verdict == ledger.CORRECTED
+
+
+def test_a_measurement_is_not_computable():
+    own = claim(kind="measurement", expected=ledger.NOT_COMPUTABLE, reason="cut on a machine")
+    assert judge(own).verdict == ledger.NOT_COMPUTABLE
+    assert judge(own, samples=6).computed == {"samples": 6}
+
+
+@pytest.mark.parametrize("kind", ["number", "list", "bound", "statement"])
+def test_everything_but_a_measurement_needs_a_value(kind):
+    with pytest.raises(ValueError, match="needs a computed value"):
+        judge(claim(kind=kind))
+
+
+@pytest.mark.parametrize("bad", [math.nan, np.nan, [0.8373, math.nan], np.array([np.nan])])
+def test_nan_is_no_result(bad):
+    with pytest.raises(ValueError, match="NaN"):
+        judge(claim(), bad)
+    with pytest.raises(ValueError, match="NaN"):
+        judge(claim(), 0.8373, corrected=bad)
+    with pytest.raises(ValueError, match="NaN"):
+        judge(claim(), 0.8373, evidence=bad)
+
+
+@pytest.mark.parametrize("bad", ["0.8373", 1j, {"a": 1}, object()])
+def test_what_is_no_number_is_refused(bad):
+    with pytest.raises(ValueError, match="neither a real number"):
+        judge(claim(), bad)
+
+
+@pytest.mark.parametrize("infinite", [math.inf, -math.inf])
+def test_a_time_never_reached_is_not_reproduced_and_shows_its_evidence(infinite):
+    own = judge(claim(printed="0.6", reason="spread {spread:.2f}"), infinite, spread=0.25)
+    assert own.verdict == ledger.NOT_REPRODUCED and own.computed == {"spread": 0.25}
+
+
+# ---- reasons ----
+
+
+def test_reason_quotes_the_evidence():
+    own = claim(reason="{printed} is printed, {value:.3f} comes out, gain {gain:.1f}")
+    assert judge(own, 0.9, gain=0.75).reason == "0.8373 is printed, 0.900 comes out, gain 0.8"
+    with pytest.raises(ValueError, match=r"quotes \['gain'\]"):
+        judge(own, 0.9)
+
+
+def test_evidence_becomes_plain_python():
+    own = judge(claim(), np.float64(0.8373), a=np.int64(3), b=np.bool_(True), c=np.array(2.0))
+    assert own.evidence == {"a": 3, "b": True, "c": 2.0}
+    assert [type(own.evidence[k]) for k in "abc"] == [int, bool, float]
+    assert type(own.computed) is float
+
+
+# ---- data files ----
+
+GOOD = """
+title = "A title"
+citation = "A. Author, A Paper"
+notebook = "paper.ipynb"
+[conventions]
+primary = "as printed"
+cut = "digits are cut"
+[errata.eq25]
+where = "eq. 25"
+[[claims]]
+id = "paper.a"
+where = "eq. 1"
+kind = "number"
+says = "pole"
+printed = "0.84"
+unit = ""
+expected = "reproduced"
+[[claims]]
+id = "paper.b"
+where = "fig. <2>"
+kind = "number"
+says = "time & <b>place</b>"
+printed = "0.6"
+unit = "s"
+expected = "not reproduced"
+reason = "it takes {value:.2f} s"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "papers").mkdir()
+    monkeypatch.setattr(ledger.resources, "files", lambda package: tmp_path)
+
+    def write(text, key="paper"):
+        (tmp_path / "papers" / f"{key}.toml").write_text(text, encoding="utf-8")
+
+    write(GOOD)
+    return write
+
+
+def test_a_good_file_loads(folder):
+    paper = ledger.load("paper")
+    assert list(paper.claims) == ["paper.a", "paper.b"]
+    assert paper.claims["paper.a"].printed == "0.84"  # a string: its digits stay
+    folder(GOOD.replace("paper.", "other."), "other")
+    assert ledger.papers() == ("other", "paper")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('id = "paper.b"', 'id = "paper.a"', r"paper\.a stands twice.*remove"),
+        ('id = "paper.b"', 'id = "b"', "b: .*begin with the paper's key"),
+        ('kind = "number"', 'kind = "numeral"', "'numeral' is none of number"),
+        ('expected = "reproduced"', 'expected = "fine"', "'fine' is none of reproduced"),
+        ('unit = ""', 'unit = ""\nconvention = "lost"', r"'lost' is not in \[conventions\]"),
+        ('unit = ""', 'unit = ""\nerratum = "eq9"', r"'eq9' is not in \[errata\]"),
+        ('unit = ""', 'unit = ""\ntolerance = 0.1', "needs a tolerance_reason"),
+        ('unit = ""', 'unit = ""\ntolerance_reason = "so"', "the other way round"),
+        ('kind = "number"', 'kind = "measurement"', "a measurement, and nothing else"),
+        ('expected = "reproduced"', 'expected = "not computable"', "a measurement, and nothing"),
+        ('reason = "it takes {value:.2f} s"', "", "gives no reason"),
+        ("it takes {value:.2f} s", "it is wrong", "quotes nothing computed.*braces"),
+        ('expected = "reproduced"', 'expected = "reproduced with correction"', "names its erratum"),
+        ("[conventions]", "[conventions", r"line \d"),
+    ],
+)
+def test_a_bad_file_is_refused_with_a_reason(folder, old, new, message):
+    assert old in GOOD
+    folder(GOOD.replace(old, new, 1))
+    with pytest.raises(ValueError, match=message):
+        ledger.load("paper")
+
+
+def test_an_unknown_paper_is_refused_with_the_known_ones(folder):
+    with pytest.raises(ValueError, match=r"no paper 'papre'.*paper"):
+        ledger.load("papre")
+
+
+OWN = 'unit = ""\ntolerance = {}\ntolerance_reason = "no"'
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        pytest.param('says = "pole"\n', "", id="a field is missing"),
+        pytest.param('unit = ""', 'unit = ""\ncolour = "red"', id="unknown field"),
+        pytest.param('citation = "A. Author, A Paper"', "", id="no citation"),
+        pytest.param('printed = "0.84"', "printed = 0.84", id="digits not a string"),
+        pytest.param('printed = "0.84"', 'printed = "3/8"', id="not a number"),
+        pytest.param('printed = "0.84"', 'printed = "nan"', id="printed NaN"),
+        pytest.param('printed = "0.84"', 'printed = "0.84;0.29"', id="two numbers for one"),
+        pytest.param('unit = ""', OWN.format(-0.1), id="negative tolerance"),
+        pytest.param('unit = ""', OWN.format("nan"), id="NaN tolerance"),
+        pytest.param('unit = ""', OWN.format("inf"), id="infinite tolerance"),
+    ],
+)
+def test_a_malformed_file_is_a_value_error_naming_the_claim_or_file(folder, old, new):
+    assert old in GOOD
+    folder(GOOD.replace(old, new, 1))
+    with pytest.raises(ValueError, match="paper"):
+        ledger.load("paper")
+
+
+# ---- the ledger ----
+
+
+def filled(folder):
+    book = Ledger.of("paper")
+    assert book.missing() == ["paper.a", "paper.b"]
+    book.check("paper.b", 1.25)
+    assert book.missing() == ["paper.a"]
+    book.check("paper.a", 0.8373150978123456)
+    return book
+
+
+def test_rows_come_in_the_order_of_the_paper_with_the_contract_fields(folder):
+    first, second = filled(folder).rows()
+    assert (first["id"], second["id"]) == ("paper.a", "paper.b")
+    contract = "id paper where says printed unit computed verdict expected_verdict tolerance"
+    contract += " convention reason erratum notebook"
+    assert set(contract.split()) <= set(first)
+    assert first["computed"] == 0.8373150978123456 and first["tolerance"] == 0.005
+    assert first["convention"] == "as printed"
+    assert second["verdict"] == second["expected_verdict"] == "not reproduced"
+    assert second["reason"] == "it takes 1.25 s"
+
+
+def test_json_round_trip_keeps_full_precision(folder):
+    book = filled(folder)
+    text = ledger.dumps(book.rows())
+    assert json.loads(text) == book.rows() and text.endswith("]\n")
+    assert json.loads(text)[0]["computed"] == 0.8373150978123456
+
+
+def test_infinities_are_null_in_the_file(folder):
+    book = Ledger.of("paper")
+    book.check("paper.b", math.inf, time=math.inf, other=-math.inf)
+    row = json.loads(ledger.dumps(book.rows()))[0]
+    assert row["evidence"] == {"time": None, "other": None}
+    assert row["reason"] == "it takes inf s"
+
+
+def test_unknown_claims_are_refused(folder):
+    with pytest.raises(ValueError, match=r"no claim 'paper\.c'"):
+        Ledger.of("paper").check("paper.c", 1.0)
+
+
+def test_a_second_check_replaces_the_first(folder):
+    book = filled(folder)
+    book.check("paper.a", 0.5)
+    assert book.rows()[0]["verdict"] == ledger.NOT_REPRODUCED and len(book.rows()) == 2
+    assert "EXPECTED: reproduced" in repr(book.judgements["paper.a"])
+
+
+def test_latest_shows_what_was_checked_since_the_last_call(folder):
+    book = filled(folder)
+    assert [row["id"] for row in book.latest().rows] == ["paper.b", "paper.a"]
+    assert book.latest().rows == []
+    assert len(book.rows()) == 2  # showing takes nothing out of the ledger
+
+
+def test_latest_shows_a_claim_checked_twice_once(folder):
+    book = Ledger.of("paper")
+    book.check("paper.a", 0.1)
+    book.check("paper.a", 0.84)
+    assert len(book.latest().rows) == 1
+
+
+def test_html_escapes_everything_a_paper_can_say(folder):
+    folder(GOOD.replace("it takes", "<script>alert('&')</script> it takes"))
+    bundle = filled(folder)._repr_mimebundle_()
+    page = bundle["text/html"]
+    assert "<script>" not in page and "&lt;script&gt;alert(&#x27;&amp;&#x27;)" in page
+    assert "<b>place</b>" not in page and "time &amp; &lt;b&gt;place" in page
+    assert "fig. &lt;2&gt;" in page
+    assert bundle[ledger.MIME] == filled(folder).rows()
+    assert "paper.a: printed 0.84, ours 0.837315: reproduced" in bundle["text/plain"]
+
+
+def test_html_says_when_a_verdict_is_not_the_expected_one(folder):
+    book = Ledger.of("paper")
+    book.check("paper.a", 0.9)
+    assert "(expected: reproduced)" in ledger.table(book.rows())
+    assert "(expected" not in ledger.table(filled(folder).rows())
+
+
+@pytest.mark.parametrize(
+    ("computed", "shown"),
+    [
+        (None, "-"),
+        (True, "holds"),
+        (False, "does not hold"),
+        ({"holds": False, "gain": 2.0}, "does not hold"),
+        ({"gain": 2.0, "fast": True}, "gain 2, fast holds"),
+        ([1.0, 0.123456789], "1; 0.123457"),
+        (6, "6"),
+    ],
+)
+def test_values_are_rounded_for_reading(computed, shown):
+    assert ledger.show_value(computed) == shown
+
+
+def test_only_a_named_paper_of_the_package_is_read_from_the_package():
+    """Without the temporary folder: the package's own data load and validate."""
+    for key in ledger.papers():
+        paper = ledger.load(key)
+        assert isinstance(paper, Paper) and paper.claims
+        for own in paper.claims.values():
+            ledger.tolerances(own)
+
+
+# ---- defects ----
+
+
+@pytest.mark.parametrize("printed", ["<20", "+-50"])
+def test_an_empty_list_proves_no_bound(printed):
+    with pytest.raises(ValueError, match="paper"):
+        judge(bound(printed), [])
+
+
+@pytest.mark.parametrize(
+    "own", [claim(printed="1"), bound("<20"), claim(kind="list", printed="1;0")]
+)
+def test_a_boolean_is_no_number(own):
+    with pytest.raises(ValueError, match="paper"):
+        judge(own, [True, False] if own.kind == "list" else True)
+
+
+@pytest.mark.parametrize("own", [claim(kind="list", printed="1;2"), bound("<20")])
+def test_a_table_is_no_list(own):
+    with pytest.raises(ValueError, match="paper"):
+        judge(own, np.ones((2, 2)))
+
+
+def test_evidence_cannot_overwrite_a_statement():
+    with pytest.raises(ValueError, match="holds"):
+        judge(claim(kind="statement"), True, holds=False)
+
+
+def test_a_reason_that_quotes_a_missing_correction_says_so():
+    with pytest.raises(ValueError, match="corrected"):
+        judge(claim(reason="corrected: {corrected:.3f}"), 0.9)
+
+
+def test_a_value_for_a_measurement_is_refused():
+    with pytest.raises(ValueError, match="measurement"):
+        judge(claim(kind="measurement", expected=ledger.NOT_COMPUTABLE, reason="lost"), 3.0)
+
+
+def test_evidence_is_flat():
+    with pytest.raises(ValueError, match=r"poles.*one by one"):
+        judge(claim(kind="statement"), True, poles=[0.9, 0.1])
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: ledger.half_width("3/8"),
+        lambda: ledger.half_width("nan"),
+        lambda: ledger.truncate(math.inf, "1.0"),
+        lambda: ledger.truncate(1.0, "x"),
+    ],
+)
+def test_digits_of_what_is_no_number_are_refused(call):
+    with pytest.raises(ValueError, match=r"3/8|nan|inf|x"):
+        call()

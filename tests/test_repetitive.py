@@ -1,0 +1,870 @@
+"""The repetitive loop by several routes: definition, matrices, python-control, closed forms."""
+
+import control
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.signal
+
+from rcbook import repetitive, zdomain
+from rcbook.repetitive import Limit, Loop, Process, RepetitiveController
+from rcbook.zdomain import NoncausalFilter, Plant
+
+SEEDS = range(4)
+MILL = Plant([9.0452, -7.8975], [1, -0.7537, -0.2404], 1, 1 / 60)  # thesis, eq. 7
+PI = Plant([0.064, 0.032], [1, -1], 0, 1 / 60)  # thesis, eq. 11
+MILLING = Process(MILL, PI)
+LAG = Process(Plant([0.5, 0.2], [1, -0.9, 0.1], 2, 1.0))  # a plant by itself, two samples late
+OUTSIDE = Process(Plant([1.0, 1.6], [1, -0.6, 0.3], 1, 1.0))  # zero at -1.6: B- = 1 + 1.6/z
+OUTSIDE_LAG = Process(Plant([0.3, -0.9, 0.5], [1, -0.5], 1, 1.0), Plant([0.1], [1, -0.8], 0, 1.0))
+
+
+def mismatched(loop, scale=1.2, shift=0.05, extra_delay=0):
+    """The same repetitive controller round a plant it was not designed for."""
+    plant = loop.process.plant
+    other = Plant(
+        scale * plant.b,
+        [1.0, plant.a[1] + shift, *plant.a[2:]],
+        plant.delay + extra_delay,
+        plant.dt,
+    )
+    return Loop(Process(other, loop.process.controller), loop.repetitive, loop.form)
+
+
+def design(process, period, gain, form, **options):
+    return repetitive.design(process, period, gain, form=form, **options)
+
+
+Q1 = zdomain.binomial_q(1)
+Q2 = zdomain.symmetric_fir([0.8, 0.1, -0.02])
+LOOPS = {
+    f"{name}, {form}": loop
+    for form in ("cascade", "plug-in")
+    for name, loop in {
+        "milling": design(MILLING, 6, 0.8, form),
+        "milling with Q": design(MILLING, 6, 0.8, form, q=Q1),
+        "no inner controller": design(LAG, 7, 0.5, form),
+        "no inner controller, long Q": design(LAG, 7, 1.1, form, q=Q2),
+        "zero outside": design(OUTSIDE, 5, 0.9, form),
+        "zeros outside, inner controller": design(OUTSIDE_LAG, 9, 0.6, form, q=Q1),
+        "shortest period": design(OUTSIDE, 2, 0.4, form),
+        "mismatch": mismatched(design(MILLING, 6, 0.8, form)),
+        "slow zero kept": design(MILLING, 8, 0.7, form, radius=0.8, normalisation="l1"),
+        "inner loop alone": Loop(MILLING, None, form),
+        "plant alone": Loop(LAG, None, form),
+    }.items()
+}
+each_loop = pytest.mark.parametrize("loop", LOOPS.values(), ids=LOOPS.keys())
+STABLE = {name: loop for name, loop in LOOPS.items() if "alone" not in name}
+
+
+def records(n, seed=0):
+    """Reference, disturbance and noise, each exciting everything."""
+    return np.random.default_rng(seed).standard_normal((3, n))
+
+
+class Definition:
+    """One sample of the loop at a time, from the block diagram.
+
+    The repetitive controller is a store of one period: p(k) = q [p + k_r C e](k - N), with q and
+    C reaching ahead of k - N but never of k.  The library multiplies polynomials instead.
+    """
+
+    def __init__(self, loop):
+        plant, inner, rc = loop.process.plant, loop.process.controller, loop.repetitive
+        self.loop, self.plant, self.inner, self.rc = loop, plant, inner, rc
+        self.lengths = {
+            "y": len(plant.a) - 1,
+            "x": plant.delay + len(plant.b) - 1,
+            "i": 0 if inner is None else len(inner.b) - 1,
+            "v": 0 if inner is None else len(inner.a) - 1,
+        }
+        if rc is not None:
+            half = len(rc.q) // 2
+            self.lengths["e"] = len(rc.compensator.b) - 1
+            self.lengths["c"] = max(len(rc.compensator.a) - 1, rc.period + half)
+            self.lengths["p"] = rc.period + half
+
+    def rest(self):
+        return {name: [0.0] * n for name, n in self.lengths.items()}
+
+    def step(self, past, r, w, noise):
+        """Signals at k and the memory for k + 1; past[name][i - 1] is the value i samples ago."""
+        plant, inner, rc = self.plant, self.inner, self.rc
+        y = sum(-plant.a[i] * past["y"][i - 1] for i in range(1, len(plant.a)))
+        y += sum(b * past["x"][plant.delay + i - 1] for i, b in enumerate(plant.b))
+        e = r - (y + noise)
+        if rc is None:
+            c, p, u = 0.0, 0.0, r
+        else:
+            comp, half = rc.compensator, len(rc.q) // 2
+            c = comp.b[0] * e
+            c += sum(comp.b[i] * past["e"][i - 1] for i in range(1, len(comp.b)))
+            c -= sum(comp.a[i] * past["c"][i - 1] for i in range(1, len(comp.a)))
+            c /= comp.a[0]
+            stored = [c, *past["c"]]
+            p = 0.0
+            for j in range(-half, half + 1):
+                lag = rc.period + j
+                p += rc.q[half + j] * (past["p"][lag - 1] + rc.gain * stored[lag - comp.advance])
+            u = p + (r if self.loop.form == "plug-in" else 0.0)
+        if inner is None:
+            i, v = 0.0, u
+        else:
+            i = u - (y + noise)
+            v = inner.b[0] * i + sum(inner.b[j] * past["i"][j - 1] for j in range(1, len(inner.b)))
+            v -= sum(inner.a[j] * past["v"][j - 1] for j in range(1, len(inner.a)))
+        fresh = {"y": y, "x": v + w, "i": i, "v": v, "e": e, "c": c, "p": p}
+        memory = {name: [fresh[name], *past[name]][: len(past[name])] for name in past}
+        return {"output": y, "command": v, "repetitive": u, "error": e}, memory
+
+    def run(self, r, w, noise):
+        past, out = self.rest(), []
+        for sample in zip(r, w, noise, strict=True):
+            signals, past = self.step(past, *sample)
+            out.append(signals)
+        return {name: np.array([s[name] for s in out]) for name in out[0]}
+
+    def state_space(self):
+        """A, B, C, D, column by column from the step itself; inputs r, w, noise."""
+        names = list(self.lengths)
+
+        def flat(memory):
+            return np.concatenate([np.array(memory[n], dtype=float) for n in names])
+
+        def shaped(x):
+            ends = np.cumsum([self.lengths[n] for n in names])
+            return {n: list(part) for n, part in zip(names, np.split(x, ends[:-1]), strict=True)}
+
+        size = sum(self.lengths.values())
+        columns = [self.step(shaped(x), 0.0, 0.0, 0.0) for x in np.eye(size)]
+        inputs = [self.step(self.rest(), *x) for x in np.eye(3)]
+        a = np.column_stack([flat(memory) for _, memory in columns])
+        b = np.column_stack([flat(memory) for _, memory in inputs])
+        c, d = (
+            np.array([[s[name] for s, _ in part] for name in repetitive.OUTPUTS])
+            for part in (columns, inputs)
+        )
+        return a, b, c, d
+
+
+def block_solution(loop, z):
+    """y, v, u, e for unit r, w, noise at the points z, from the block equations as a matrix."""
+    plant, inner, rc = loop.process.plant, loop.process.controller, loop.repetitive
+
+    def at(p):
+        return np.polyval(p[::-1], 1 / z)
+
+    g = z ** (-plant.delay) * at(plant.b) / at(plant.a)
+    k = 1.0 if inner is None else at(inner.b) / at(inner.a)
+    feedback = 0.0 if inner is None else 1.0
+    rep, through = 0.0, 1.0
+    if rc is not None:
+        q = sum(
+            rc.q[len(rc.q) // 2 + j] * z ** (-j)
+            for j in range(-(len(rc.q) // 2), len(rc.q) // 2 + 1)
+        )
+        c = z**rc.compensator.advance * at(rc.compensator.b) / at(rc.compensator.a)
+        rep = rc.gain * q * z ** (-rc.period) * c / (1 - q * z ** (-rc.period))
+        through = 1.0 if loop.form == "plug-in" else 0.0
+    #                 y            v    u    e
+    matrix = np.array([[1, -g, 0, 0], [feedback * k, 1, -k, 0], [0, 0, 1, -rep], [1, 0, 0, 1]])
+    #                 r        w  noise
+    right = np.array([[0, g, 0], [0, 0, -feedback * k], [through, 0, 0], [1, 0, -1]])
+    return np.linalg.solve(matrix, right)
+
+
+def schur_cohn(p):
+    """Whether all roots of a polynomial (highest power first) lie inside the circle, by Jury."""
+    p = np.trim_zeros(np.array(p, dtype=float), "f")
+    while p.size > 1:
+        reflection = p[-1] / p[0]
+        if abs(reflection) >= 1:
+            return False
+        p = ((p - reflection * p[::-1]) / (1 - reflection**2))[:-1]
+    return True
+
+
+def outside_by_winding(p, points=2**14):
+    """Roots of z^n p(z^-1) outside the circle, by the argument principle for x = z^-1."""
+    x = np.exp(2j * np.pi * np.arange(points + 1) / points)
+    angle = np.unwrap(np.angle(np.polyval(np.asarray(p)[::-1], x)))
+    return round((angle[-1] - angle[0]) / (2 * np.pi))
+
+
+def open_polynomials(loop):
+    """d and n of the characteristic polynomial d + k n, term by term from the block diagram."""
+    plant, inner, rc = loop.process.plant, loop.process.controller, loop.repetitive
+    half, length = len(rc.q) // 2, 0
+    a, b = plant.a, np.r_[np.zeros(plant.delay), plant.b]
+    path = [(a, 1.0)] if inner is None else [(np.convolve(a, inner.a), 1.0)]
+    if inner is not None:
+        path.append((np.convolve(b, inner.b), 1.0))
+        b = np.convolve(b, inner.b)
+    length = max(p.size for p, _ in path)
+    closed = sum(s * np.pad(p, (0, length - p.size)) for p, s in path)
+    generator = np.zeros(rc.period + half + 1)
+    generator[0] = 1.0
+    generator[rc.period - half :] -= rc.q
+    d = np.convolve(np.convolve(closed, generator), rc.compensator.a)
+    ahead = np.r_[np.zeros(rc.period - half - rc.compensator.advance), rc.q]
+    n = np.convolve(np.convolve(b, ahead), rc.compensator.b)
+    length = max(d.size, n.size)
+    return np.pad(d, (0, length - d.size)), np.pad(n, (0, length - n.size))
+
+
+# ---- responses ----
+
+
+@each_loop
+@pytest.mark.parametrize("seed", SEEDS)
+def test_recursion_and_transfer_functions_agree_with_the_definition(loop, seed):
+    r, w, noise = records(90, seed)
+    truth = Definition(loop).run(r, w, noise)
+    for run in (repetitive.simulate(loop, r, w, noise), repetitive.respond(loop, r, w, noise)):
+        for name, expected in truth.items():
+            # 90 samples of order 100 in double precision; zeros within 0.8 are cancelled
+            np.testing.assert_allclose(getattr(run, name), expected, atol=1e-8, err_msg=name)
+        np.testing.assert_allclose(
+            run.inner_error, truth["repetitive"] - truth["output"] - noise, atol=1e-8
+        )
+
+
+def delayed(process, by):
+    plant = process.plant
+    return Process(Plant(plant.b, plant.a, plant.delay + by, plant.dt), process.controller)
+
+
+def slips(loop):
+    """Loops that are wrong in one small place."""
+    rc = loop.repetitive
+    late = NoncausalFilter(rc.compensator.b, rc.compensator.a, rc.compensator.advance - 1)
+    yield Loop(loop.process, RepetitiveController(late, rc.period, rc.gain, rc.q), loop.form)
+    yield Loop(
+        loop.process, RepetitiveController(rc.compensator, rc.period + 1, rc.gain, rc.q), loop.form
+    )
+    yield Loop(delayed(loop.process, 1), rc, loop.form)
+    other, room = (np.ones(1), 0) if rc.q.size > 1 else (Q1, int(rc.delay == 0))  # Q lost, or added
+    yield Loop(
+        loop.process,
+        RepetitiveController(rc.compensator, rc.period + room, rc.gain, other),
+        loop.form,
+    )
+    yield loop.with_gain(1.01 * rc.gain)
+    yield Loop(loop.process, rc, "cascade" if loop.form == "plug-in" else "plug-in")
+
+
+@pytest.mark.parametrize("loop", STABLE.values(), ids=STABLE.keys())
+def test_definition_notices_every_slip(loop):
+    r, w, noise = records(90)
+    truth = Definition(loop).run(r, w, noise)
+    for mutant in slips(loop):
+        run = repetitive.simulate(mutant, r, w, noise)
+        assert np.abs(run.output - truth["output"]).max() > 1e-3
+
+
+def thesis(period, gain, n, runout, literal_25=False):
+    """Eqs 24-28 with unrounded coefficients; `literal_25` keeps the printed shift of eq. 25."""
+    kp, alpha, a1, a2, b0, b1 = 0.064, 1.5, -0.7537, -0.2404, 9.0452, -7.8975
+    ki = kp * (alpha - 1)
+    p = [1, a1 - 1 + kp * b0, a2 - a1 + kp * b1 + ki * b0, -a2 + ki * b1]
+    q = [kp * b0, kp * b1 + ki * b0, ki * b1]
+    force, command, error, inner, v_r = ({} for _ in range(5))
+
+    def get(s, k):
+        return s.get(k, 0.0)
+
+    def w(k):
+        return runout[k] if 0 <= k < n else 0.0
+
+    for k in range(n):
+        late = 1 if literal_25 else 0
+        force[k] = -a1 * get(force, k - 1) - a2 * get(force, k - 2)
+        force[k] += b0 * (get(command, k - 1 - late) + w(k - 1 - late))
+        force[k] += b1 * (get(command, k - 2 - late) + w(k - 2 - late))
+        error[k] = 20.0 - force[k]
+        u = sum(gain * p[i] * get(error, k - period + 1 - i) for i in range(4))
+        for i in range(3):
+            u += q[i] * get(v_r, k - period - i) - (q[i] * get(v_r, k - i) if i else 0.0)
+        v_r[k] = u / q[0]
+        inner[k] = v_r[k] - force[k]
+        command[k] = get(command, k - 1) + kp * inner[k] + ki * get(inner, k - 1)
+    return {
+        "output": np.array(list(force.values())),
+        "command": np.array(list(command.values())),
+        "repetitive": np.array(list(v_r.values())),
+        "error": np.array(list(error.values())),
+    }
+
+
+@pytest.mark.parametrize("period", [2, 6, 12])
+@pytest.mark.parametrize("gain", [0.4, 0.8, 1.4, 2.0, 2.4])
+def test_thesis_recursion_with_equation_25_corrected_is_the_cascade(period, gain):
+    runout = 0.3 * np.sin(2 * np.pi * np.arange(90) / 6 + 2 * np.pi / 3)
+    loop = repetitive.design(
+        Process(MILL, repetitive.pi_controller(0.064, 1.5, 1 / 60)), period, gain
+    )
+    run = repetitive.simulate(loop, np.full(90, 20.0), runout)
+    scale = max(1.0, np.abs(run.output).max())  # at k_r = 2.4 and N = 2 the force grows
+    for name, expected in thesis(period, gain, 90, runout).items():
+        # rounding over 90 samples relative to the largest force; 1 - 1.4^45 amplifies it
+        np.testing.assert_allclose(getattr(run, name), expected, atol=1e-8 * scale, err_msg=name)
+    printed = thesis(period, gain, 90, runout, literal_25=True)
+    assert np.abs(printed["output"] - run.output).max() > 1.0  # lb: the misprint shows at once
+
+
+@pytest.mark.parametrize("form", repetitive.FORMS)
+@pytest.mark.parametrize("q", [np.ones(1), Q1], ids=["no Q", "Q"])
+@pytest.mark.parametrize("process", [MILLING, OUTSIDE], ids=["milling", "zero outside"])
+def test_python_control_interconnection_gives_the_same_response(process, q, form):
+    loop = repetitive.design(process, 6, 0.7, q=q, form=form)
+    rc, dt = loop.repetitive, loop.dt
+    comp, half = rc.compensator, q.size // 2
+
+    def block(num, den, name, inputs, output):
+        size = max(len(num), len(den))
+        num, den = (np.pad(p, (0, size - len(p))) for p in (num, den))
+        num = np.trim_zeros(num, "f")  # scipy warns of leading zeros
+        system = control.ss(*scipy.signal.tf2ss(num, den), dt)
+        return control.StateSpace(system, name=name, inputs=inputs, outputs=output)
+
+    delay = 6 - half - comp.advance
+    controller = block(
+        np.r_[np.zeros(delay), 0.7 * np.convolve(q, comp.b)], comp.a, "rc", ["s"], ["p0"]
+    )
+    # positive feedback round a delay of one period is the generator 1/(1 - q z^-N)
+    store = block(np.r_[np.zeros(6 - half), q], [1.0], "store", ["p"], ["p1"])
+    plant = process.plant
+    parts = [
+        controller,
+        store,
+        block(np.r_[np.zeros(plant.delay), plant.b], plant.a, "plant", ["x"], ["y"]),
+        control.summing_junction(["p0", "p1"], "p", name="generator"),
+        control.summing_junction(["v", "w"], "x", name="input"),
+        control.summing_junction(["y", "noise"], "m", name="sensor"),
+        control.summing_junction(["r", "-m"], "s", name="comparison"),
+        control.summing_junction(["p", "r"] if form == "plug-in" else ["p"], "u", name="sum"),
+    ]
+    if process.controller is None:
+        parts.append(control.summing_junction(["u"], "v", name="wire"))
+    else:
+        parts.append(control.summing_junction(["u", "-m"], "i", name="inner"))
+        parts.append(block(process.controller.b, process.controller.a, "pi", ["i"], ["v"]))
+    whole = control.interconnect(
+        parts, inplist=["r", "w", "noise"], outlist=["y", "v", "u", "s"], dt=dt
+    )
+    inputs = records(60)
+    found = control.forced_response(whole, dt * np.arange(60), inputs)
+    run = repetitive.simulate(loop, *inputs)
+    for signal, expected in zip(
+        (run.output, run.command, run.repetitive, run.error), found.outputs, strict=True
+    ):
+        np.testing.assert_allclose(signal, expected, atol=1e-9)  # rounding over 60 samples
+
+
+@each_loop
+def test_every_transfer_is_that_of_the_block_equations(loop):
+    z = 1.07 * np.exp(1j * np.linspace(0, np.pi, 23))
+    for point in z:
+        truth = block_solution(loop, point)
+        for i, output in enumerate(repetitive.OUTPUTS):
+            for j, source in enumerate(repetitive.SOURCES):
+                num, den = repetitive.transfer(loop, source, output)
+                ours = np.polyval(num[::-1], 1 / point) / np.polyval(den[::-1], 1 / point)
+                # a linear solve of four equations of moderate condition
+                assert ours == pytest.approx(truth[i, j], rel=1e-8, abs=1e-9), (source, output)
+
+
+@each_loop
+def test_frequency_response_and_sensitivity_are_those_of_the_block_equations(loop):
+    for f in np.array([0.013, 0.11, 0.27, 0.49]) / loop.dt:  # Hz
+        truth = block_solution(loop, np.exp(2j * np.pi * f * loop.dt))
+        ours = repetitive.frequency_response(loop, "disturbance", "output", f)
+        assert ours == pytest.approx(truth[0, 1], rel=1e-8)
+        # y + noise for unit noise
+        assert repetitive.sensitivity(loop, f) == pytest.approx(truth[0, 2] + 1, rel=1e-8)
+
+
+def test_sensitivity_of_a_cascade_has_the_textbook_form():
+    loop = LOOPS["milling, cascade"]
+    f = 3.7
+    z = np.exp(2j * np.pi * f / 60)
+    closed = MILLING.command_path.to_control()(z)
+    g_pi = (PI.to_control() * MILL.to_control())(z)
+    rep = 0.8 * z**-6 / (1 - z**-6) / closed
+    # a disturbance on the output meets 1 + (PI + rep PI) G = (1 + PI G)(1 + rep closed)
+    truth = 1 / ((1 + g_pi) * (1 + rep * closed))
+    assert repetitive.sensitivity(loop, f) == pytest.approx(truth, rel=1e-10)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_loop_of_python_control_feedback_is_the_process(seed):
+    rng = np.random.default_rng(seed)
+    plant = Plant(
+        rng.uniform(-1, 1, 3), [1, *rng.uniform(-0.4, 0.4, 2)], int(rng.integers(1, 4)), 0.1
+    )
+    pi = repetitive.pi_controller(rng.uniform(0.01, 0.2), rng.uniform(0.1, 1.8), 0.1)
+    process, z = Process(plant, pi), 1.1 * np.exp(1j * np.linspace(0, np.pi, 15))
+    g, k = plant.to_control(), pi.to_control()
+    # rounding of ratios of short polynomials
+    np.testing.assert_allclose(
+        zdomain.response(process.command_path, z), control.feedback(g * k)(z), rtol=1e-9
+    )
+    np.testing.assert_allclose(
+        zdomain.response(process.disturbance_path, z), control.feedback(g, k)(z), rtol=1e-9
+    )
+
+
+def test_pi_controller_adds_up_its_input():
+    pi = repetitive.pi_controller(0.064, 1.5, 1 / 60)
+    # eq. 9 by hand: Kp e(k) + alpha Kp (sum of all earlier errors)
+    e = np.array([1.0, -2.0, 0.5, 3.0])
+    truth = [0.064 * e[k] + 1.5 * 0.064 * e[:k].sum() for k in range(4)]
+    np.testing.assert_allclose(scipy.signal.lfilter(pi.b, pi.a, e), truth, atol=1e-15)
+
+
+@pytest.mark.parametrize("gain", [0.3, 0.8, 1.0, 1.6, 2.0, 2.3])
+@pytest.mark.parametrize(("process", "period"), [(MILLING, 6), (LAG, 7)])
+def test_step_climbs_a_staircase_one_step_a_period(process, period, gain):
+    """Exact cancellation: y = k z^-N/(1 - (1 - k) z^-N) r, thus r (1 - (1 - k)^m) in period m."""
+    loop = repetitive.design(process, period, gain, normalisation="dc")
+    n = 9 * period
+    run = repetitive.simulate(loop, np.full(n, 20.0))
+    truth = 20 * (1 - (1 - gain) ** (np.arange(n) // period))
+    # cancelled modes decay: rounding of the command, at most some 1e-13 per sample
+    np.testing.assert_allclose(run.output, truth, atol=1e-9)
+    late = 20 * (1 - (1 - gain) ** ((np.arange(n) + 1) // period))
+    assert np.abs(run.output - late).max() > 1  # one sample of slip would show
+
+
+def test_signals_before_the_first_period_are_zero_in_a_cascade():
+    run = repetitive.simulate(LOOPS["milling, cascade"], np.full(30, 20.0))
+    assert not run.output[:6].any()  # exactly: nothing has left the store yet
+    assert run.repetitive[:5].tolist() == [0] * 5 and run.repetitive[5] != 0  # N - d = 5
+
+
+def test_time_counts_seconds():
+    run = repetitive.simulate(LOOPS["milling, cascade"], np.zeros(61))
+    assert run.time[-1] == pytest.approx(1.0, rel=1e-15)
+
+
+# ---- limits ----
+
+
+def limited(loop, r, w, noise, command, repet):
+    """The recursions with clipping, from the definition of `Limit`, on lists."""
+    plant, inner, rc = loop.process.plant, loop.process.controller, loop.repetitive
+    num, den = [0.0], [1.0]
+    through = [1.0]
+    if rc is not None:
+        half = len(rc.q) // 2
+        num = np.zeros(rc.period - half - rc.compensator.advance).tolist()
+        num += (rc.gain * np.convolve(rc.q, rc.compensator.b)).tolist()
+        generator = np.zeros(rc.period + half + 1)
+        generator[0] = 1
+        generator[rc.period - half :] -= rc.q
+        den = np.convolve(generator, rc.compensator.a).tolist()
+        through = den if loop.form == "plug-in" else [0.0]
+    y, e, u, u_mem, i, v, v_mem = ([] for _ in range(7))
+    acted = [0, 0]
+
+    def past(p, s, k, first):
+        return sum(p[j] * s[k - j] for j in range(first, len(p)) if k - j >= 0)
+
+    x = []
+    for k in range(len(r)):
+        y.append(-sum(plant.a[j] * y[k - j] for j in range(1, len(plant.a)) if k - j >= 0))
+        y[k] += sum(
+            plant.b[j] * x[k - j - plant.delay]
+            for j in range(len(plant.b))
+            if k - j - plant.delay >= 0
+        )
+        e.append(r[k] - y[k] - noise[k])
+        raw = (past(num, e, k, 0) + past(through, r, k, 0) - past(den, u_mem, k, 1)) / den[0]
+        u.append(max(-repet.value, min(repet.value, raw)))
+        acted[1] += abs(raw) > repet.value
+        u_mem.append(u[k] if repet.remember_clipped else raw)
+        if inner is None:
+            raw = u[k]
+        else:
+            i.append(u[k] - y[k] - noise[k])
+            raw = past(inner.b, i, k, 0) - past(inner.a, v_mem, k, 1)
+        v.append(max(-command.value, min(command.value, raw)))
+        acted[0] += abs(raw) > command.value
+        v_mem.append(v[k] if command.remember_clipped else raw)
+        x.append(v[k] + w[k])
+    return {"output": y, "command": v, "repetitive": u, "error": e}, acted
+
+
+LIMITS = [
+    (Limit(c, keep_c), Limit(u, keep_u))
+    for c, u in ((0.5, np.inf), (np.inf, 0.8), (0.6, 0.9))
+    for keep_c in (True, False)
+    for keep_u in (True, False)
+]
+
+
+@each_loop
+@pytest.mark.parametrize("limits", LIMITS, ids=lambda p: f"{p[0]} {p[1]}".replace("Limit", ""))
+def test_limits_and_their_memory_follow_the_definition(loop, limits):
+    r, w, noise = records(60, seed=3)
+    truth, acted = limited(loop, r, w, noise, *limits)
+    run = repetitive.simulate(loop, r, w, noise, *limits)
+    scale = max(1.0, max(np.abs(s).max() for s in truth.values()))
+    for name, expected in truth.items():
+        np.testing.assert_allclose(getattr(run, name), expected, atol=1e-9 * scale, err_msg=name)
+    assert [run.command_clipped, run.repetitive_clipped] == acted and sum(acted) > 0
+    assert np.abs(run.command).max() <= limits[0].value
+    assert np.abs(run.repetitive).max() <= limits[1].value
+
+
+@pytest.mark.parametrize("loop", STABLE.values(), ids=STABLE.keys())
+def test_a_limit_that_is_never_reached_changes_nothing(loop):
+    r, w, noise = records(60, seed=1)
+    free = repetitive.simulate(loop, r, w, noise)
+    big = Limit(2 * max(np.abs(free.command).max(), np.abs(free.repetitive).max()))
+    raw = Limit(big.value, remember_clipped=False)
+    for limit in (big, raw):
+        run = repetitive.simulate(loop, r, w, noise, limit, limit)
+        for name in repetitive.OUTPUTS:
+            assert np.array_equal(getattr(run, name), getattr(free, name))
+        assert run.command_clipped == run.repetitive_clipped == 0
+
+
+@pytest.mark.parametrize(
+    "name", ["milling, cascade", "milling, plug-in", "inner loop alone, cascade"]
+)
+def test_limit_oracle_tells_the_two_memories_apart(name):
+    r, w, noise = records(60, seed=3)
+    one, other = (
+        limited(LOOPS[name], r, w, noise, Limit(0.05, keep), Limit(0.3, keep))[0]
+        for keep in (True, False)
+    )
+    assert np.abs(np.array(one["output"]) - other["output"]).max() > 0.1
+
+
+def test_a_value_that_just_reaches_the_limit_is_not_counted_as_clipped():
+    run = repetitive.simulate(LOOPS["plant alone, cascade"], np.ones(5), command_limit=Limit(1.0))
+    assert run.command_clipped == 0
+
+
+# ---- stability ----
+
+
+@pytest.mark.parametrize("loop", STABLE.values(), ids=STABLE.keys())
+@pytest.mark.parametrize("gain", [0.1, 0.9, 1.9, 2.1, 3.0])
+def test_characteristic_polynomial_holds_every_mode_of_the_block_diagram(loop, gain):
+    loop = loop.with_gain(gain)
+    a, *_ = Definition(loop).state_space()
+    d, n = open_polynomials(loop)
+    found = repetitive.stability(loop)
+    polynomial = repetitive.characteristic_polynomial(loop)
+    # exact sums of products: rounding of coefficients of order one
+    np.testing.assert_allclose(
+        np.pad(polynomial, (0, d.size - polynomial.size)), d + gain * n, atol=1e-12
+    )
+    # two eigenvalue problems; the other one carries Jordan blocks at 0, none near the circle
+    assert found.spectral_radius == pytest.approx(np.abs(np.linalg.eigvals(a)).max(), abs=1e-6)
+    assert (found.verdict == "stable") == schur_cohn(d + gain * n)
+    outside = int(np.sum(np.abs(found.roots) > 1))
+    assert outside == outside_by_winding(d + gain * n)
+    assert (found.verdict == "stable") == (outside == 0)
+
+
+@pytest.mark.parametrize(
+    ("period", "gain"),
+    [(n, k) for n in (2, 6, 60) for k in (0.05, 0.8, 1.7, 2.2)]
+    + [(300, 1.7), (300, 2.2), (1000, 0.8)],
+)
+def test_exact_cancellation_leaves_generator_modes_and_what_was_cancelled(period, gain):
+    loop = repetitive.design(MILLING, period, gain)
+    # eq. 12: P and Q factor out of the characteristic polynomial
+    ki = 0.032
+    p = [1, -0.7537 - 1 + 0.064 * 9.0452, -0.2404 + 0.7537 - 0.064 * 7.8975 + ki * 9.0452]
+    p.append(0.2404 - ki * 7.8975)
+    others = [*np.abs(np.roots(p)), 7.8975 / 9.0452, 0.5]
+    truth = max(abs(1 - gain) ** (1 / period), *others)
+    found = repetitive.stability(loop)
+    # backward error of a companion matrix of order N: about N eps
+    assert found.spectral_radius == pytest.approx(truth, rel=1e-10)
+    on_ring = np.sum(np.abs(np.abs(found.roots) - abs(1 - gain) ** (1 / period)) < 1e-9)
+    assert on_ring == period or abs(1 - gain) ** (1 / period) in others
+
+
+@pytest.mark.parametrize("period", [60, 100, 300])
+@pytest.mark.parametrize("q", [Q1, Q2], ids=["binomial", "flat"])
+def test_long_periods_with_q_agree_with_winding_and_jury(period, q):
+    for gain in (0.5, 1.9, 2.6, 6.0):
+        loop = repetitive.design(OUTSIDE, period, gain, q=q)
+        d, n = open_polynomials(loop)
+        found = repetitive.stability(loop)
+        outside = outside_by_winding(d + gain * n, points=2**17)
+        assert int(np.sum(np.abs(found.roots) > 1)) == outside
+        assert (found.verdict == "stable") == (outside == 0) == schur_cohn(d + gain * n)
+
+
+@pytest.mark.parametrize("period", [4, 5, 9])
+@pytest.mark.parametrize("gain", [0.3, 1.2, 1.9])
+def test_modes_with_a_zero_outside_solve_their_own_equation(period, gain):
+    """z^N = 1 - k |B-|^2/b with |B-|^2 = 1 + c^2 + c (z + 1/z): a polynomial of its own."""
+    c = 1.6
+    loop = repetitive.design(OUTSIDE, period, gain)
+    p = np.zeros(period + 2)  # times z, highest power first
+    p[0], p[-2] = 1.0, -1.0
+    p[-3:] += gain * np.array([c, 1 + c * c, c]) / (1 + c) ** 2
+    truth = [*np.roots(p), *np.roots([1, -0.6, 0.3])]
+    radius = repetitive.stability(loop).spectral_radius
+    assert radius == pytest.approx(np.abs(truth).max(), rel=1e-10)  # simple roots
+
+
+@pytest.mark.parametrize(
+    ("gain", "verdict"), [(1.999, "stable"), (2.0, "marginal"), (2.001, "unstable")]
+)
+def test_verdict_turns_at_a_gain_of_two(gain, verdict):
+    assert repetitive.stability(repetitive.design(MILLING, 6, gain)).verdict == verdict
+
+
+@pytest.mark.parametrize("name", STABLE)
+def test_stable_gains_are_those_of_a_scan(name):
+    loop = STABLE[name]
+    d, n = open_polynomials(loop)
+    intervals = repetitive.stable_gains(loop, highest=5.0)
+    for gain in np.concatenate([np.geomspace(1e-3, 0.1, 20), np.linspace(0.101, 4.99, 150)]):
+        if any(abs(gain - edge) < 1e-6 for pair in intervals for edge in pair):
+            continue  # Jury's test itself cannot decide so near to the circle
+        inside = any(low < gain < high for low, high in intervals)
+        assert inside == schur_cohn(d + gain * n), gain
+
+
+@pytest.mark.parametrize("extra_delay", [0, 1])
+@pytest.mark.parametrize("scale", [0.5, 1.0, 1.6, 3.0])
+@pytest.mark.parametrize("q", [np.ones(1), Q1], ids=["no Q", "Q"])
+def test_stable_gains_under_mismatch_are_those_of_a_scan(extra_delay, scale, q):
+    loop = mismatched(repetitive.design(MILLING, 6, 0.8, q=q), scale, 0.03, extra_delay)
+    d, n = open_polynomials(loop)
+    intervals = repetitive.stable_gains(loop, highest=5.0)
+    gains = np.linspace(0.0137, 4.99, 150)
+    inside = [any(low < g < high for low, high in intervals) for g in gains]
+    near = [any(abs(g - edge) < 1e-6 for pair in intervals for edge in pair) for g in gains]
+    for gain, ours, undecided in zip(gains, inside, near, strict=True):
+        assert undecided or ours == schur_cohn(d + gain * n), gain
+
+
+# characteristic polynomials d + k n of order 5, found by a random search for two intervals: the
+# mean of two stable polynomials need not be stable
+TWO_INTERVALS = [
+    ([1.0, 2.485, 0.681, -2.837, -3.228, -1.155], [1.04, 2.089, 1.73, 0.583]),
+    ([1.0, -0.86, 2.073, -0.275, -0.292, 0.645], [-0.978, 0.434, 0.176, -0.304]),
+    ([1.0, 2.032, 0.612, -1.005, -0.811, -0.111], [0.672, 0.869, 0.479, 0.037]),
+    ([1.0, -1.947, 3.167, -3.322, 1.806, -0.226], [-0.924, 1.395, -0.632, 0.003]),
+]
+
+
+@pytest.mark.parametrize(("d", "n"), TWO_INTERVALS)
+def test_stable_gains_finds_both_of_two_intervals(d, n):
+    q = next(root.real for root in np.roots(d) if root.imag == 0)  # the generator's pole, N = 1
+    plant = Plant([1.0], np.polydiv(d, [1.0, -q])[0], 1, 1.0)
+    repeat = RepetitiveController(NoncausalFilter(np.array(n) / q, [1.0], 0), 1, 1.0, [q])
+    intervals = repetitive.stable_gains(Loop(Process(plant), repeat), highest=6.0)
+    assert len(intervals) == 2
+    d, n = np.array(d), np.array([0, 0, *n])
+    for gain in np.linspace(0.003, 5.997, 1500):
+        inside = any(low < gain < high for low, high in intervals)
+        if all(abs(gain - edge) > 1e-6 for pair in intervals for edge in pair):
+            assert inside == schur_cohn(d + gain * n), gain
+    for edge in np.ravel(intervals):
+        # at an edge a root lies on the circle: the edge is good to rounding
+        assert np.abs(np.roots(d + edge * n)).max() == pytest.approx(1.0, abs=1e-9)
+    loop = Loop(Process(plant), repeat)
+    assert repetitive.gain_limit(loop) == 0.0  # small gains are unstable here
+
+
+@pytest.mark.parametrize("period", [2, 6, 60, 200])
+def test_stable_gains_of_exact_cancellation_end_at_two(period):
+    intervals = repetitive.stable_gains(repetitive.design(MILLING, period, 0.8))
+    (low, high), *others = intervals
+    # N clustered crossings, each good to N eps
+    assert low == 0.0 and high == pytest.approx(2.0, rel=1e-9) and not others
+
+
+def test_a_lightly_damped_pole_that_is_cancelled_is_no_edge():
+    """It lies within 1e-4 of the circle but never on it: one interval, not two side by side."""
+    pair = 0.99995 * np.exp([1j, -1j])
+    loop = repetitive.design(Process(Plant([1.0], np.poly(pair).real, 1, 1.0)), 5, 0.5)
+    ((low, high),) = repetitive.stable_gains(loop)
+    assert low == 0.0 and high == pytest.approx(2.0, rel=1e-9)
+
+
+def test_gain_scan_is_not_used_up_by_its_own_limit():
+    loop = repetitive.design(MILLING, 6, 0.8)
+    assert repetitive.stable_gains(loop, highest=1.5) == [(0.0, 1.5)]
+    assert repetitive.gain_limit(loop) == pytest.approx(2.0, rel=1e-9)
+
+
+def test_no_gain_is_stable_with_the_wrong_sign():
+    wrong = mismatched(repetitive.design(MILLING, 6, 0.8), scale=-0.01, shift=0.0)
+    assert repetitive.stable_gains(wrong) == [] and repetitive.gain_limit(wrong) == 0.0
+
+
+@pytest.mark.parametrize("period", [4, 6])
+def test_a_zero_at_a_harmonic_leaves_its_mode_marginal_at_any_gain(period):
+    """B(-1) = 0 hides the generator's mode at z = -1 when N is even: d(-1) = n(-1) = 0."""
+    loop = repetitive.design(Process(Plant([1.0, 1.0], [1.0, -0.5], 1, 1.0)), period, 0.5)
+    d, n = open_polynomials(loop)
+    signs = (-1.0) ** np.arange(d.size)
+    assert d @ signs == pytest.approx(0, abs=1e-14) and n @ signs == pytest.approx(0, abs=1e-14)
+    assert repetitive.stability(loop).verdict == "marginal"
+
+
+@pytest.mark.parametrize("period", [4, 6])
+@pytest.mark.parametrize("zero", [1.0, -1.0])
+def test_no_gain_is_stable_when_a_mode_of_the_generator_cannot_be_moved(period, zero):
+    loop = repetitive.design(Process(Plant([1.0, -zero], [1.0, -0.5], 1, 1.0)), period, 0.5)
+    intervals = repetitive.stable_gains(loop)
+    assert intervals == [] and repetitive.gain_limit(loop) == 0.0
+
+
+def test_a_zero_at_minus_one_does_no_harm_at_an_odd_period():
+    loop = repetitive.design(Process(Plant([1.0, 1.0], [1.0, -0.5], 1, 1.0)), 5, 0.5)
+    assert repetitive.stability(loop).verdict == "stable"
+
+
+# ---- steady state ----
+
+
+def circulant_solution(loop, r, w):
+    """One period of the steady state as linear equations in time, the shift being circular."""
+    n = r.size
+    plant, inner, rc = loop.process.plant, loop.process.controller, loop.repetitive
+    shift = np.roll(np.eye(n), 1, axis=0)
+
+    def circ(p):
+        return sum(c * np.linalg.matrix_power(shift, i) for i, c in enumerate(p))
+
+    one, none = np.eye(n), np.zeros((n, n))
+    a, b = circ(plant.a), circ(np.r_[np.zeros(plant.delay), plant.b])
+    k_num, k_den, feedback = (one, one, 0.0) if inner is None else (circ(inner.b), circ(inner.a), 1)
+    if rc is None:
+        num, den, through = none, one, one
+    else:
+        back = np.linalg.matrix_power(shift.T, len(rc.q) // 2)
+        q = back @ circ(rc.q)
+        ahead = np.linalg.matrix_power(shift.T, rc.compensator.advance)
+        num = rc.gain * q @ ahead @ circ(rc.compensator.b)  # z^-N is the identity here
+        den = (one - q) @ circ(rc.compensator.a)
+        through = den if loop.form == "plug-in" else none
+    matrix = np.block(
+        [
+            [a, -b, none, none],
+            [feedback * k_num, k_den, -k_num, none],
+            [none, none, den, -num],
+            [one, none, none, one],
+        ]
+    )
+    right = np.concatenate([b @ w, np.zeros(n), through @ r, r])
+    return np.linalg.solve(matrix, right).reshape(4, n)
+
+
+def records_of_one_period(loop, seed):
+    period = 7 if loop.repetitive is None else loop.repetitive.period
+    return np.random.default_rng(seed).standard_normal((2, period))
+
+
+@each_loop
+@pytest.mark.parametrize("seed", SEEDS)
+def test_steady_state_solves_the_periodic_equations(loop, seed):
+    r, w = records_of_one_period(loop, seed)
+    steady = repetitive.steady_state(loop, r, w)
+    y, v, u, e = circulant_solution(loop, r, w)
+    # condition of the periodic equations below 1e5
+    np.testing.assert_allclose(steady.output, y, atol=1e-10)
+    np.testing.assert_allclose(steady.command, v, atol=1e-10)
+    np.testing.assert_allclose(steady.repetitive, u, atol=1e-10)
+    np.testing.assert_allclose(steady.error, e, atol=1e-10)
+    np.testing.assert_allclose(steady.inner_error, u - y, atol=1e-10)
+
+
+@each_loop
+def test_steady_state_is_where_a_long_run_ends(loop):
+    r, w = records_of_one_period(loop, 11)
+    radius = repetitive.stability(loop).spectral_radius
+    # radius^(periods * n) below 1e-13
+    periods = int(np.ceil(np.log(1e-13) / np.log(radius) / r.size)) + 2
+    run = repetitive.respond(loop, np.tile(r, periods), np.tile(w, periods))
+    steady = repetitive.steady_state(loop, r, w)
+    for name in repetitive.OUTPUTS:
+        np.testing.assert_allclose(getattr(run, name)[-r.size :], getattr(steady, name), atol=1e-8)
+    shifted = np.roll(steady.output, 1)
+    assert np.abs(run.output[-r.size :] - shifted).max() > 1e-3  # a slip by one sample shows
+
+
+@pytest.mark.parametrize("form", repetitive.FORMS)
+def test_without_q_the_steady_error_is_zero_and_with_q_it_is_not(form):
+    r, w = np.random.default_rng(2).standard_normal((2, 6))
+    free = repetitive.steady_state(repetitive.design(MILLING, 6, 0.8, form=form), r, w)
+    assert np.abs(free.error).max() < 1e-11  # rounding: every harmonic is a generator pole
+    low = repetitive.steady_state(repetitive.design(MILLING, 6, 0.8, q=Q1, form=form), r, w)
+    assert np.abs(low.error).max() > 0.05
+
+
+def test_steady_state_of_a_long_period_still_solves_the_periodic_equations():
+    loop = repetitive.design(MILLING, 120, 0.8, q=Q1)
+    r, w = np.random.default_rng(4).standard_normal((2, 120))
+    y, *_ = circulant_solution(loop, r, w)
+    steady = repetitive.steady_state(loop, r, w)
+    np.testing.assert_allclose(steady.output, y, atol=1e-9)  # 480 equations
+
+
+# ---- noise ----
+
+
+@pytest.mark.parametrize("name", LOOPS)
+@pytest.mark.parametrize("output", repetitive.OUTPUTS)
+def test_noise_gain_is_that_of_the_lyapunov_equation(name, output):
+    loop = LOOPS[name]
+    a, b, c, d = Definition(loop).state_space()
+    noise, row = b[:, 2:], c[repetitive.OUTPUTS.index(output)]
+    through = d[repetitive.OUTPUTS.index(output), 2]
+    covariance = scipy.linalg.solve_discrete_lyapunov(a, noise @ noise.T)
+    variance = row @ covariance @ row + through**2
+    # a Lyapunov solver loses 1/(1 - radius), here at most 1e3, and the square root half of it;
+    # a loop that noise does not reach has 0 = sqrt(rounding)
+    ours = repetitive.noise_gain(loop, output)
+    assert ours == pytest.approx(np.sqrt(max(variance, 0.0)), rel=1e-7, abs=1e-7)
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_noise_gain_is_the_energy_of_the_impulse_response(name):
+    loop = LOOPS[name]
+    radius = repetitive.stability(loop).spectral_radius
+    n = int(np.log(1e-6) / np.log(radius)) + 40
+    impulse = np.eye(1, n)[0]
+    run = repetitive.simulate(loop, np.zeros(n), noise=impulse)
+    for output in repetitive.OUTPUTS:
+        energy = np.sqrt(np.sum(getattr(run, output) ** 2))
+        # the energy of the tail left out has the relative size (1e-6)^2
+        assert repetitive.noise_gain(loop, output) == pytest.approx(energy, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(
+    "name", ["milling, cascade", "milling with Q, plug-in", "mismatch, cascade"]
+)
+def test_noise_gain_lies_in_the_confidence_band_of_a_noise_run(name, seed):
+    loop, n = LOOPS[name], 100_000
+    rng = np.random.default_rng(100 + seed)
+    run = repetitive.respond(loop, np.zeros(n), noise=rng.standard_normal(n))
+    h = repetitive.simulate(loop, np.zeros(800), noise=np.eye(1, 800)[0]).output
+    correlation = np.correlate(h, h, "full")
+    # Gaussian: var of the mean square = 2/n sum R^2; a standard deviation has half of it; 4.5 sd
+    band = 4.5 * 0.5 * np.sqrt(2 / n * np.sum(correlation**2)) / np.sum(h**2)
+    assert band < 0.05
+    assert repetitive.noise_gain(loop) == pytest.approx(run.output.std(), rel=band)
+
+
+def test_noise_gain_of_exact_cancellation_has_the_closed_form():
+    """Plant alone: y = -k z^-N/(1 - (1 - k) z^-N) noise, thus k/sqrt(1 - (1 - k)^2)."""
+    for gain in (0.2, 0.8, 1.0, 1.5):
+        loop = repetitive.design(LAG, 7, gain)
+        truth = gain / np.sqrt(1 - (1 - gain) ** 2)
+        assert repetitive.noise_gain(loop) == pytest.approx(truth, rel=1e-10)  # rounding

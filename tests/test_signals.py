@@ -1,0 +1,139 @@
+"""References, disturbances and measures against their definitions."""
+
+import numpy as np
+import pytest
+
+from rcbook import signals
+
+SEEDS = range(8)
+
+
+# ---- references and disturbances ----
+
+
+def test_step_is_zero_before_its_start_and_high_from_there():
+    assert signals.step(20.0, 5, start=2).tolist() == [0, 0, 20, 20, 20]
+    assert signals.step(-3.0, 3).tolist() == [-3, -3, -3]
+    assert signals.step(1.0, 3, start=3).tolist() == [0, 0, 0]
+
+
+def test_sinusoid_counts_frequency_in_hertz_and_phase_in_radians():
+    y = signals.sinusoid(0.3, 10.0, 1 / 60, 7, 2 * np.pi / 3)
+    # sin(120, 180, 240, 300, 0, 60, 120 degrees)
+    half = np.sqrt(3) / 2
+    np.testing.assert_allclose(y, 0.3 * half * np.array([1, 0, -1, -1, 0, 1, 1]), atol=1e-15)
+
+
+@pytest.mark.parametrize("n", [1, 3, 7, 8])
+def test_periodic_repeats_its_shape(n):
+    shape = [1.0, -2.0, 5.0]
+    assert signals.periodic(shape, n).tolist() == [shape[k % 3] for k in range(n)]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("period", [2, 6, 61])
+def test_random_period_has_zero_mean_and_the_asked_amplitude(seed, period):
+    shape = signals.random_period(period, 0.25, np.random.default_rng(seed))
+    assert shape.shape == (period,)
+    # rounding of a mean and of a quotient, times the period
+    assert shape.sum() == pytest.approx(0.0, abs=1e-13)
+    assert shape.max() - shape.min() == pytest.approx(0.5, rel=1e-13)
+    again = signals.random_period(period, 0.25, np.random.default_rng(seed))
+    assert np.array_equal(shape, again)
+
+
+# ---- measures ----
+
+
+def loop_settling(y, target, band, dt):
+    """The definition, read aloud: try every sample as the first settled one."""
+    for k in range(len(y)):
+        if all(abs(value - target) <= band for value in y[k:]):
+            return k * dt
+    return np.inf
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_settling_time_is_the_first_instant_after_which_nothing_leaves_the_band(seed):
+    rng = np.random.default_rng(seed)
+    for _ in range(30):
+        y = 20 + 10 * rng.standard_normal(25) * np.exp(-0.2 * np.arange(25))
+        band = rng.choice([0.02, 0.5, 2.0, 30.0])
+        expected = loop_settling(y, 20.0, band, 1 / 60)
+        assert signals.settling_time(y, 20.0, band, 1 / 60) == pytest.approx(expected, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("y", "expected"),
+    [
+        ([1, 1, 1], 0.0),  # never outside
+        ([0, 1, 1], 0.5),
+        ([1, 0, 1], 1.0),  # the last entry counts, not the first
+        ([1, 1, 0], np.inf),  # leaves at the last sample
+        ([0, 0, 1], 1.0),  # enters at the last sample
+        ([0, 0, 0], np.inf),
+        ([0.75, 1.25, 0.75], 0.0),  # exactly on the band, which belongs to it
+        ([0.7499999, 1, 1], 0.5),
+        ([1], 0.0),
+        ([0], np.inf),
+    ],
+)
+def test_settling_time_at_the_edges_of_its_definition(y, expected):
+    assert signals.settling_time(y, 1.0, 0.25, 0.5) == expected
+
+
+def test_settling_time_accepts_a_moving_target():
+    assert signals.settling_time([0, 2, 3, 5], [1.0, 2.0, 3.0, 5.0], 0.1, 1.0) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("y", "target", "expected"),
+    [
+        ([0, 24, 20], 20, 20.0),
+        ([0, -24, -20], -20, 20.0),  # beyond a negative target
+        ([24, 0], -20, 0.0),  # far on the other side is no overshoot
+        ([0, 19.9], 20, 0.0),
+        ([0, 20], 20, 0.0),
+    ],
+)
+def test_overshoot_is_in_percent_of_a_target_of_either_sign(y, target, expected):
+    assert signals.overshoot(y, target) == pytest.approx(expected, abs=1e-12)  # rounding
+
+
+def test_spread_and_rms_of_a_known_record():
+    assert signals.spread([3.0, -4.0, 1.0]) == 7.0
+    assert signals.rms([3.0, -4.0]) == pytest.approx(np.sqrt(12.5), rel=1e-15)
+
+
+@pytest.mark.parametrize("period", [2, 3, 6, 60, 61])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_harmonics_put_the_signal_together_again(period, seed):
+    shape = np.random.default_rng(seed).standard_normal(period)
+    y = np.tile(shape, 3)
+    k = np.arange(period)
+    rebuilt = sum(
+        (c := signals.harmonic(y, period, order)).real * np.cos(2 * np.pi * order * k / period)
+        - c.imag * np.sin(2 * np.pi * order * k / period)
+        for order in range(period // 2 + 1)
+    )
+    np.testing.assert_allclose(rebuilt, shape, atol=1e-12)  # rounding of an inverse DFT
+
+
+@pytest.mark.parametrize("lag", [-150.0, -90.0, 0.0, 30.0, 179.0])
+def test_phase_of_a_lagging_signal_is_negative(lag):
+    k = np.arange(120)
+    x = np.cos(2 * np.pi * k / 12 + 0.4) + 0.7  # a mean does not disturb the fundamental
+    y = 3 * np.cos(2 * np.pi * k / 12 + 0.4 + np.radians(lag))
+    assert signals.phase_between(y, x, 12) == pytest.approx(lag, abs=1e-10)  # rounding, in degrees
+    assert signals.phase_between(x, y, 12) == pytest.approx(-lag, abs=1e-10)
+
+
+def test_one_sample_of_delay_at_six_per_turn_is_sixty_degrees_of_lag():
+    x = signals.sinusoid(1.0, 10.0, 1 / 60, 60)
+    assert signals.phase_between(np.roll(x, 1), x, 6) == pytest.approx(-60.0, abs=1e-10)
+    assert abs(signals.phase_between(-x, x, 6)) == pytest.approx(180.0, abs=1e-10)
+
+
+def test_signal_names_the_first_bad_sample():
+    with pytest.raises(ValueError, match=r"force .* sample 2"):
+        signals.signal([0.0, 1.0, np.nan, np.inf], "force")

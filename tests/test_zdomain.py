@@ -1,0 +1,399 @@
+"""Zero-phase inverse, zero split, zero-order hold and Q filters against other algorithms."""
+
+import control
+import numpy as np
+import pytest
+import scipy.integrate
+import scipy.optimize
+import scipy.signal
+
+from rcbook import zdomain
+from rcbook.zdomain import NoncausalFilter, Plant
+
+CIRCLE = np.exp(1j * np.linspace(-np.pi, np.pi, 257))  # both ends: z = -1 and z = 1 included
+SEEDS = range(12)
+
+
+def random_roots(rng, count, low, high):
+    """`count` roots of magnitude low..high, closed under conjugation."""
+    roots = []
+    while len(roots) < count:
+        size = low + (high - low) * rng.random()
+        if count - len(roots) >= 2 and rng.random() < 0.6:
+            root = size * np.exp(1j * np.pi * (0.05 + 0.9 * rng.random()))
+            roots += [root, root.conjugate()]
+        else:
+            roots.append(size * rng.choice([-1.0, 1.0]))
+    return np.array(roots)
+
+
+def from_roots(roots):
+    """Monic polynomial, term by term and without np.poly."""
+    p = [1.0 + 0j]
+    for root in roots:
+        p = [a - root * b for a, b in zip([*p, 0], [0, *p], strict=True)]
+    return np.array(p).real
+
+
+def random_case(seed, order=None):
+    """A plant with known zeros inside 0.8 and outside 1.1, and its true B-."""
+    rng = np.random.default_rng(seed)
+    order = int(rng.integers(1, 6)) if order is None else order
+    outside = int(rng.integers(0, order))
+    inner = random_roots(rng, int(rng.integers(0, order - outside)), 0.1, 0.8)
+    outer = random_roots(rng, outside, 1.1, 2.5)
+    gain = rng.choice([-1, 1]) * 10 ** rng.uniform(-2, 2)
+    b = gain * np.convolve(from_roots(inner), from_roots(outer))
+    a = from_roots(random_roots(rng, order, 0.05, 0.97))
+    return Plant(b, a, int(rng.integers(0, 4)), 0.01), from_roots(outer)
+
+
+def value(p, z):
+    """p(z^-1) by powers, not by Horner's rule."""
+    return sum(c * z ** (-float(i)) for i, c in enumerate(p))
+
+
+def peak_square(p):
+    """Maximum of |p|^2 on the circle: a dense grid, then a bounded search round its top."""
+    w = np.linspace(0, np.pi, 4001)
+
+    def negative(x):
+        return -(abs(value(p, np.exp(1j * x))) ** 2)
+
+    best = max(-negative(w))
+    for x in w[np.argsort(negative(w))[:3]]:
+        found = scipy.optimize.minimize_scalar(
+            negative, bounds=(x - 1e-3, x + 1e-3), method="bounded", options={"xatol": 1e-10}
+        )
+        best = max(best, -found.fun)
+    return best
+
+
+# ---- zero-phase inverse ----
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("normalisation", ["peak", "dc", "l1"])
+def test_plant_times_inverse_is_real_and_the_square_of_b_minus(seed, normalisation):
+    plant, b_minus = random_case(seed)
+    inverse = zdomain.zero_phase_inverse(plant, 1.0, normalisation)
+    forward = CIRCLE ** (-float(plant.delay)) * value(plant.b, CIRCLE) / value(plant.a, CIRCLE)
+    backward = CIRCLE ** float(inverse.advance) * value(inverse.b, CIRCLE)
+    product = forward * backward / value(inverse.a, CIRCLE)
+    scale = {
+        "peak": peak_square(b_minus),
+        "dc": float(np.sum(b_minus)) ** 2,
+        "l1": float(np.sum(np.abs(b_minus))) ** 2,
+    }[normalisation]
+    truth = abs(value(b_minus, CIRCLE)) ** 2 / scale
+    # roots of up to degree 5 carry some 1e-12; the search of the peak another 1e-12
+    np.testing.assert_allclose(product.real, truth, rtol=0, atol=2e-10 * truth.max())
+    assert np.abs(product.imag).max() < 2e-10 * truth.max()
+    assert product.real.min() > -2e-10 * truth.max()
+    if normalisation == "peak":
+        assert product.real.max() <= 1 + 1e-10  # rounding of the product
+    if normalisation == "l1":
+        assert scale >= peak_square(b_minus) * (1 - 1e-12)  # the triangle inequality
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_plant_then_inverse_in_time_is_the_autocorrelation_of_b_minus_at_the_advance(seed):
+    plant, b_minus = random_case(seed)
+    inverse = zdomain.zero_phase_inverse(plant, normalisation="dc")
+    degree = b_minus.size - 1
+    assert inverse.advance == plant.delay + degree
+    impulse = np.eye(1, 40)[0]
+    y = scipy.signal.lfilter(plant.b, plant.a, np.roll(impulse, plant.delay))
+    out = scipy.signal.lfilter(inverse.b, inverse.a, y)
+    expected = np.zeros(40)
+    centre = inverse.advance
+    expected[centre - degree : centre + degree + 1] = np.correlate(b_minus, b_minus, "full")
+    expected /= b_minus.sum() ** 2
+    # cancelled zeros lie within 0.8: rounding 1e-16 times gains of the inverse, at most 1e5 here
+    np.testing.assert_allclose(out, expected, atol=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("slip", [-1, 1])
+def test_oracle_notices_an_advance_wrong_by_one_sample(slip):
+    plant, _ = random_case(3)
+    inverse = zdomain.zero_phase_inverse(plant)
+    mutant = NoncausalFilter(inverse.b, inverse.a, inverse.advance + slip)
+    product = zdomain.response(plant, CIRCLE) * zdomain.response(mutant, CIRCLE)
+    assert np.abs(product.imag).max() > 0.1 * np.abs(product).max()
+
+
+def test_oracle_notices_b_minus_that_is_not_reflected():
+    plant = Plant([1.0, 1.7], [1.0, -0.5], 1, 1.0)
+    inverse = zdomain.zero_phase_inverse(plant)
+    mutant = NoncausalFilter(
+        zdomain.multiply(plant.a, [1.0, 1.7]) / 2.7**2, inverse.a, inverse.advance
+    )
+    product = zdomain.response(plant, CIRCLE) * zdomain.response(mutant, CIRCLE)
+    assert np.abs(product.imag).max() > 0.1
+
+
+@pytest.mark.parametrize("radius", [0.2, 0.5, 0.75, 0.9, 1.0])
+def test_radius_decides_which_stable_zeros_are_cancelled(radius):
+    zeros = np.array([0.95, 0.6, -0.3, 1.4])
+    plant = Plant(2.5 * from_roots(zeros), from_roots([0.9, 0.2, -0.1]), 2, 0.1)
+    inverse = zdomain.zero_phase_inverse(plant, radius, "dc")
+    kept = from_roots(zeros[np.abs(zeros) >= radius])
+    product = zdomain.response(plant, CIRCLE) * zdomain.response(inverse, CIRCLE)
+    truth = abs(value(kept, CIRCLE)) ** 2 / kept.sum() ** 2
+    # roots of a quartic with separated zeros: 1e-13
+    np.testing.assert_allclose(product, truth, atol=1e-11 * truth.max())
+    assert inverse.advance == 2 + np.sum(np.abs(zeros) >= radius)
+
+
+@pytest.mark.parametrize("zero", [1.0, -1.0, np.exp(0.7j), np.exp(2.1j)])
+def test_zeros_on_the_circle_are_not_cancelled(zero):
+    pair = [zero] if np.imag(zero) == 0 else [zero, np.conj(zero)]
+    plant = Plant(from_roots([*pair, 0.5]), [1.0, -0.5, 0.1], 1, 1.0)
+    inverse = zdomain.zero_phase_inverse(plant)
+    np.testing.assert_allclose(inverse.a, [1.0, -0.5], atol=1e-12)  # only the zero at 0.5
+    gain = zdomain.response(plant, zero) * zdomain.response(inverse, zero)
+    assert abs(gain) < 1e-12  # rounding: the zero stays where it was
+
+
+@pytest.mark.parametrize("angle", [np.pi / 2, np.pi / 3, 2.0])
+def test_double_zeros_on_the_circle_are_not_cancelled(angle):
+    pair = np.array([1.0, -2 * np.cos(angle), 1.0])
+    b_plus, b_minus = zdomain.split_zeros(np.convolve(pair, pair))
+    assert b_plus.size == 1 and b_minus.size == 5
+
+
+def test_triple_zero_on_the_circle_is_not_cancelled():
+    b_plus, b_minus = zdomain.split_zeros([1.0, 3.0, 3.0, 1.0])
+    assert b_plus.size == 1 and b_minus.size == 4
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_peak_square_finds_the_peak_of_any_polynomial(seed):
+    rng = np.random.default_rng(seed)
+    p = rng.standard_normal(int(rng.integers(1, 12)))
+    # the search stops within 1e-10 rad of a flat top: 1e-18; the rest is rounding
+    assert zdomain._peak_square(p) == pytest.approx(peak_square(p), rel=1e-11)
+
+
+def test_peak_square_of_closed_forms():
+    assert zdomain._peak_square(np.array([1.0])) == 1.0
+    assert zdomain._peak_square(np.array([1.0, -3.0])) == pytest.approx(16.0, rel=1e-15)
+    # |1 + z^-2|^2 = 4 cos(w)^2 and |1 - z^-1 + z^-2|^2 = (2 cos w - 1)^2
+    assert zdomain._peak_square(np.array([1.0, 0.0, 1.0])) == pytest.approx(4.0, rel=1e-15)
+    assert zdomain._peak_square(np.array([1.0, -1.0, 1.0])) == pytest.approx(9.0, rel=1e-15)
+    # |1 + z^-1 - z^-2|^2 = 3 - 2 cos 2w = 5 - 4 cos(w)^2, an inner maximum at w = pi/2
+    assert zdomain._peak_square(np.array([1.0, 1.0, -1.0])) == pytest.approx(5.0, rel=1e-14)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_split_multiplies_back_and_holds_the_right_zeros(seed):
+    rng = np.random.default_rng(seed)
+    inner = random_roots(rng, int(rng.integers(0, 4)), 0.0, 0.69)
+    outer = random_roots(rng, int(rng.integers(0, 4)), 0.71, 3.0)
+    b = -4.2 * np.convolve(from_roots(inner), from_roots(outer))
+    b_plus, b_minus = zdomain.split_zeros(b, radius=0.7)
+    # roots up to degree 6, separated only at random: some 1e-10
+    np.testing.assert_allclose(np.convolve(b_plus, b_minus), b, atol=1e-8 * np.abs(b).max())
+    np.testing.assert_allclose(b_minus, from_roots(outer), atol=1e-8 * np.abs(b).max())
+    assert b_minus[0] == 1.0
+
+
+def test_split_treats_zeros_at_the_origin_as_cancelled():
+    b_plus, b_minus = zdomain.split_zeros([2.0, -1.0, 0.0])
+    np.testing.assert_allclose(np.convolve(b_plus, b_minus), [2.0, -1.0, 0.0], atol=1e-15)
+
+
+# ---- zero-order hold ----
+
+
+def test_hold_of_first_order_lag_has_the_closed_form():
+    gain, tau, dt = 3.0, 0.2, 0.05
+    plant = zdomain.zero_order_hold(control.tf([gain], [tau, 1]), dt)
+    pole = np.exp(-dt / tau)
+    assert plant.delay == 1
+    np.testing.assert_allclose(plant.b, [gain * (1 - pole)], rtol=1e-13)  # rounding
+    np.testing.assert_allclose(plant.a, [1, -pole], rtol=1e-13)
+
+
+@pytest.mark.parametrize("dt", [1.0, 0.1, 0.01])
+def test_hold_of_double_integrator_has_the_closed_form(dt):
+    plant = zdomain.zero_order_hold(control.tf([1], [1, 0, 0]), dt)
+    assert plant.delay == 1
+    # b = a difference of numbers of size 2, rounded to 4e-16, over dt^2/2
+    np.testing.assert_allclose(plant.b, [dt**2 / 2] * 2, rtol=4e-15 / dt**2)
+    np.testing.assert_allclose(plant.a, [1, -2, 1], atol=1e-14)
+
+
+def test_hold_of_underdamped_second_order_has_the_closed_form():
+    omega, zeta, dt = 12.0, 0.2, 0.04
+    plant = zdomain.zero_order_hold(control.tf([omega**2], [1, 2 * zeta * omega, omega**2]), dt)
+    damped = omega * np.sqrt(1 - zeta**2)
+    decay, c, s = np.exp(-zeta * omega * dt), np.cos(damped * dt), np.sin(damped * dt)
+    slope = zeta * omega / damped
+    b1 = 1 - decay * (c + slope * s)
+    b2 = decay**2 + decay * (slope * s - c)
+    np.testing.assert_allclose(plant.b, [b1, b2], rtol=1e-12)  # rounding
+    np.testing.assert_allclose(plant.a, [1, -2 * decay * c, decay**2], rtol=1e-12)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_hold_agrees_with_partial_fractions(seed):
+    rng = np.random.default_rng(seed)
+    order = int(rng.integers(1, 6))
+    poles = -np.arange(1, order + 1) * (1 + 0.3 * rng.random(order))
+    num, den, dt = rng.standard_normal(int(rng.integers(1, order + 1))), np.poly(poles), 0.3
+    residues, p, _ = scipy.signal.residue(num, den)
+    plant = zdomain.zero_order_hold(control.tf(num, den), dt)
+    z = 1.3 * np.exp(2j * np.pi * np.arange(50) / 50)
+    e = np.exp(p * dt)
+    truth = sum(r * (ei - 1) / pi / (z - ei) for r, pi, ei in zip(residues, p, e, strict=True))
+    # residues of five real poles lose about four digits, b itself about as many
+    np.testing.assert_allclose(
+        zdomain.response(plant, z), truth, atol=1e-10 * np.abs(residues).max()
+    )
+    assert plant.delay == 1
+
+
+def test_hold_reproduces_the_continuous_step_response_at_the_samples():
+    a = np.array([[0, 1.0, 0, 0], [-40, -1, 40, 1], [0, 0, 0, 1], [20, 0.5, -25, -3]])
+    b, c = np.array([0, 0, 0, 5.0]), np.array([1.0, 0, 0, 0])
+    plant = zdomain.zero_order_hold(control.ss(a, b[:, None], c[None], 0), 0.05)
+    t = 0.05 * np.arange(40)
+    found = scipy.integrate.solve_ivp(
+        lambda _, x: a @ x + b, (0, t[-1]), np.zeros(4), t_eval=t, rtol=1e-11, atol=1e-13
+    )
+    y = scipy.signal.lfilter(plant.numerator, plant.a, np.ones(t.size))
+    # integrator tolerance 1e-11 against a response of order one
+    np.testing.assert_allclose(y, c @ found.y, atol=1e-8)
+    shifted = np.concatenate([[0.0], y[:-1]])  # the mutant, one sample late
+    assert np.abs(shifted - c @ found.y).max() > 1e-2
+
+
+def test_hold_keeps_the_dc_gain():
+    system = control.tf([2.0, 7.0], np.poly([-1, -2, -3.5]))
+    plant = zdomain.zero_order_hold(system, 0.1)
+    # a(1) = prod(1 - e^(p dt)) = 0.005: rounding of 1e-16 is magnified by 200
+    assert plant.b.sum() / plant.a.sum() == pytest.approx(1.0, rel=1e-11)  # 7/(1 2 3.5)
+
+
+@pytest.mark.parametrize(("num", "delay"), [([2.0, 1.0], 0), ([1.0], 1)])
+def test_hold_counts_direct_feedthrough_as_no_delay(num, delay):
+    plant = zdomain.zero_order_hold(control.tf(num, [1.0, 3.0]), 0.1)
+    assert plant.delay == delay
+    if delay == 0:
+        assert plant.b[0] == pytest.approx(2.0, rel=1e-15)  # D of the continuous plant
+
+
+EULERIAN = {2: [1, 1], 3: [1, 4, 1], 4: [1, 11, 11, 1], 5: [1, 26, 66, 26, 1]}
+
+
+def integrators(n):
+    return control.ss(np.eye(n, k=1), np.eye(n)[:, -1:], np.eye(n)[:1], 0)
+
+
+@pytest.mark.parametrize("n", EULERIAN)
+def test_hold_of_integrator_chains_has_eulerian_numerators(n):
+    plant = zdomain.zero_order_hold(integrators(n), 1.0)
+    factorial = np.prod(np.arange(1, n + 1))
+    assert plant.delay == 1
+    # differences of binomials up to 10, over 1/120
+    np.testing.assert_allclose(plant.b * factorial, EULERIAN[n], atol=1e-10)
+
+
+@pytest.mark.parametrize("n", [4, 5])
+def test_hold_keeps_the_digits_of_small_leading_coefficients(n):
+    dt = 0.01
+    plant = zdomain.zero_order_hold(integrators(n), dt)
+    factorial = np.prod(np.arange(1, n + 1))
+    # a numerator by impulse response or by det-free formulas is good to about 1e-9 here
+    np.testing.assert_allclose(plant.b * factorial / dt**n, EULERIAN[n], rtol=1e-6)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e-9, 1e-12])
+def test_hold_does_not_depend_on_the_unit_of_the_output(scale):
+    system = control.tf([1.0], [1.0, 2.0, 3.0])
+    one = zdomain.zero_order_hold(system, 0.1)
+    scaled = zdomain.zero_order_hold(scale * system, 0.1)
+    np.testing.assert_allclose(scaled.b / scale, one.b, rtol=1e-12)  # linearity; rounding
+
+
+def test_hold_of_a_static_gain_is_the_gain():
+    plant = zdomain.zero_order_hold(control.tf([2.0], [1.0]), 0.1)
+    assert plant.delay == 0 and plant.b[0] == 2.0
+
+
+# ---- plants and polynomials ----
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_plant_agrees_with_python_control_on_the_circle(seed):
+    plant, _ = random_case(seed)
+    z = 1.2 * CIRCLE
+    # rounding of quotients of two polynomials up to degree 8
+    np.testing.assert_allclose(zdomain.response(plant, z), plant.to_control()(z), rtol=1e-9)
+
+
+def test_leading_coefficient_of_the_denominator_is_scaled_away():
+    plant = Plant([4.0, 2.0], [2.0, -1.0], 1, 0.1)
+    assert plant.a.tolist() == [1.0, -0.5] and plant.b.tolist() == [2.0, 1.0]
+
+
+def test_poles_and_zeros_come_by_decreasing_magnitude_without_the_origin():
+    plant = Plant([1.0, -1.7, 0.6, 0.0], [1.0, 0.2, -0.15, 0.0, 0.0], 3, 1.0)
+    # roots of quadratics: z^2 - 1.7 z + 0.6 and z^2 + 0.2 z - 0.15
+    np.testing.assert_allclose(plant.zeros, [1.2, 0.5], rtol=1e-13)
+    np.testing.assert_allclose(plant.poles, [-0.5, 0.3], rtol=1e-13)
+
+
+@pytest.mark.parametrize(("pole", "stable"), [(0.999, True), (1.0, False), (-1.0, False)])
+def test_stability_of_a_plant_ends_at_the_circle(pole, stable):
+    assert Plant([1.0], [1.0, -pole], 1, 1.0).is_stable is stable
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 64])
+def test_unit_circle_holds_the_roots_of_unity_from_one_on(n):
+    z = zdomain.unit_circle(n)
+    np.testing.assert_allclose(z**n, 1.0, atol=1e-13)  # rounding times n
+    assert z[0] == 1 and np.unique(np.round(z, 9)).size == n
+    assert n < 3 or z[1].imag > 0  # counter-clockwise, as np.fft counts
+
+
+def test_frequencies_are_in_hertz():
+    np.testing.assert_allclose(zdomain.at_frequency([0, 15, 30], 1 / 60), [1, 1j, -1], atol=1e-15)
+
+
+def test_add_and_multiply_and_shift_are_those_of_polynomials():
+    p, q = np.array([1.0, 2.0, 3.0]), np.array([5.0, -1.0])
+    x = 0.37
+    assert np.polyval(zdomain.add(p, q)[::-1], x) == pytest.approx(
+        np.polyval(p[::-1], x) + np.polyval(q[::-1], x), rel=1e-14
+    )
+    assert np.polyval(zdomain.multiply(p, q, q)[::-1], x) == pytest.approx(
+        np.polyval(p[::-1], x) * np.polyval(q[::-1], x) ** 2, rel=1e-14
+    )
+    assert np.polyval(zdomain.shift(q, 3)[::-1], x) == pytest.approx(
+        x**3 * np.polyval(q[::-1], x), rel=1e-14
+    )
+
+
+# ---- Q filters ----
+
+
+@pytest.mark.parametrize("passes", [0, 1, 2, 5])
+def test_binomial_q_is_a_power_of_the_cosine_at_half_the_angle(passes):
+    gain = zdomain.zero_phase_gain(zdomain.binomial_q(passes), CIRCLE)
+    # (z + 2 + 1/z)/4 = cos(w/2)^2
+    np.testing.assert_allclose(gain, np.cos(np.angle(CIRCLE) / 2) ** (2 * passes), atol=1e-14)
+
+
+def test_symmetric_fir_has_the_gain_of_its_cosine_sum():
+    half, w = [0.5, 0.2, -0.05], np.angle(CIRCLE)
+    taps = zdomain.symmetric_fir(half)
+    assert taps.tolist() == [-0.05, 0.2, 0.5, 0.2, -0.05]
+    truth = 0.5 + 0.4 * np.cos(w) - 0.1 * np.cos(2 * w)
+    np.testing.assert_allclose(zdomain.zero_phase_gain(taps, CIRCLE), truth, atol=1e-14)
+
+
+def test_q_filters_that_are_symmetric_but_for_rounding_are_accepted():
+    """scipy.signal.firwin returns such windows for some lengths (7 taps at 0.3, for one)."""
+    zdomain.odd_symmetric([0.25, 0.5, np.nextafter(0.25, 1)])
