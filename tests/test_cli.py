@@ -7,7 +7,7 @@ import sys
 import pytest
 from conftest import COVER, LEDGER
 
-from rcbook import cli, ledger, pages, project, render, run
+from rcbook import cli, ledger, project, render, run
 
 
 @pytest.fixture

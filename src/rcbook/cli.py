@@ -112,7 +112,7 @@ def _print_table(rows: Sequence[dict]) -> None:
     for row in rows:
         flip = "" if row["verdict"] == row["expected_verdict"] else " (NOT EXPECTED)"
         shown = (
-            pages.printed(row),
+            ledger.show_printed(row),
             ledger.show_value(row["computed"]),
             row["verdict"] + flip,
             row["reason"],

@@ -398,6 +398,12 @@ def show(judgement: Judgement) -> str:
     return show_value(_finite(judgement.computed))
 
 
+def show_printed(row: Mapping) -> str:
+    """What the paper prints for a ledger row, with its unit where it is a number."""
+    bare = row["kind"] == "statement" or row["unit"] in ("", "1")
+    return row["printed"] if bare else f"{row['printed']} {row['unit']}"
+
+
 def show_value(computed: object) -> str:
     """A computed value of the ledger file, rounded for reading."""
     if computed is None:
@@ -408,7 +414,8 @@ def show_value(computed: object) -> str:
         if "holds" in computed:
             mended = "; corrected, it holds" if computed.get("holds_corrected") else ""
             return show_value(computed["holds"]) + mended
-        return ", ".join(f"{name} {show_value(part)}" for name, part in computed.items())
+        parts = computed.items()
+        return ", ".join(f"{name.replace('_', ' ')} {show_value(part)}" for name, part in parts)
     if isinstance(computed, list) and len(computed) > _LONG:
         return f"{min(computed):.6g} to {max(computed):.6g} ({len(computed)} values)"
     if isinstance(computed, list):
@@ -428,7 +435,6 @@ def table(rows: Sequence[Mapping], reasons: bool = True) -> str:
 
 def _table_row(row: Mapping, reasons: bool) -> str:
     e = html.escape
-    unit = f" {e(row['unit'])}" if row["unit"] not in ("", "1") else ""
     verdict = e(row["verdict"])
     if row["verdict"] != row["expected_verdict"]:
         verdict += f" <b>(expected: {e(row['expected_verdict'])})</b>"
@@ -436,7 +442,7 @@ def _table_row(row: Mapping, reasons: bool) -> str:
     return (
         f'<tr data-verdict="{e(row["verdict"])}" data-paper="{e(row["paper"])}">'
         f"<td>{e(row['says'])}<br><small>{where}</small></td>"
-        f"<td>{e(row['printed'])}{unit}</td><td>{e(show_value(row['computed']))}</td>"
+        f"<td>{e(show_printed(row))}</td><td>{e(show_value(row['computed']))}</td>"
         f"<td>{verdict}</td>" + (f"<td>{e(row['reason'])}</td>" * reasons) + "</tr>"
     )
 

@@ -108,7 +108,7 @@ def _ledger_row(row: Mapping, chapter: str) -> str:
     )
     cells = (
         claim,
-        _math(printed(row)),
+        _math(ledger.show_printed(row)),
         _math(ledger.show_value(row["computed"])),
         _tolerance(row),
         _verdict(row),
@@ -120,12 +120,6 @@ def _ledger_row(row: Mapping, chapter: str) -> str:
         f'<tr role="row" id="{id}" data-paper="{html.escape(row["paper"])}" '
         f'data-verdict="{html.escape(row["verdict"])}">{tds}</tr>'
     )
-
-
-def printed(row: Mapping) -> str:
-    """What the paper prints for a claim, with its unit."""
-    unit = "" if row["unit"] in ("", "1") else f" {row['unit']}"
-    return f"{row['printed']}{unit}" if row["printed"] else "–"
 
 
 def _tolerance(row: Mapping) -> str:
