@@ -205,3 +205,20 @@ def test_positive_modes_agree_with_the_hold_of_a_continuous_plant(mode, tau):
 
 def test_a_mill_resampled_to_twelve_per_turn_counts_twelve():
     assert replace(HORNG1989, plant=resample(PLANT, 1 / 120)).samples_per_turn == 12
+
+
+@pytest.mark.parametrize("sine", [-1.0, -0.5, 0.5, 1.0])
+@pytest.mark.parametrize("rate", [20.0, 90.0, 120.0])
+def test_sine_part_belongs_to_a_continuous_machine_that_sixty_hertz_does_not_show(sine, rate):
+    """Step response of the modes in continuous time, written down and sampled."""
+    assert np.allclose(resample(PLANT, 1 / 60, "damped cosine", sine).b, PLANT.b, atol=1e-9)
+    slow, fast = PLANT.poles
+    gains = [
+        float(np.polyval(PLANT.b[::-1], 1 / p) / (1 - q / p) / (1 - p))
+        for p, q in ((slow, fast), (fast, slow))
+    ]
+    t = np.arange(30) * 60 / rate  # in intervals of 1/60 s
+    swing = np.abs(fast) ** t * (np.cos(np.pi * t) + sine * np.sin(np.pi * t))
+    truth = gains[0] * (1 - slow**t) + gains[1] * (1 - swing)
+    found = step_response(resample(PLANT, 1 / rate, "damped cosine", sine), 30)
+    np.testing.assert_allclose(found, truth, atol=1e-9 * np.abs(truth).max())  # slow gain 200

@@ -169,7 +169,7 @@ def test_the_executed_run_is_the_rendered_one(make):
     stamp = judged.notebooks["one.ipynb"].cells[2].outputs[0].text.strip()
     chapter = (project.html / "notebooks" / "one.html").read_text(encoding="utf-8")
     assert stamp in chapter
-    assert '<a href="../ledger.html#fake.x"><code>fake.x</code></a>' in chapter
+    assert '<a href="../ledger.html#fake.y"><code>fake.y</code></a>' in chapter
     assert "The gain" in (project.html / "ledger.html").read_text(encoding="utf-8")
     assert "typographical" in (project.html / "errata.html").read_text(encoding="utf-8")
     assert (project.html / "_images" / "cover.png").is_file()

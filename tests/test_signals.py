@@ -24,6 +24,44 @@ def test_sinusoid_counts_frequency_in_hertz_and_phase_in_radians():
     np.testing.assert_allclose(y, 0.3 * half * np.array([1, 0, -1, -1, 0, 1, 1]), atol=1e-15)
 
 
+def test_triangle_starts_at_a_lower_tip_and_counts_hertz_and_radians():
+    """4 Hz at 10 ms, 2.5 about 2.5: 25 samples hold one period, 0.4 per sample up from 0."""
+    y = signals.triangle(2.5, 4.0, 0.01, 25, bias=2.5)
+    rise = 5 * np.arange(13) / 12.5
+    # rounding of an angle of 2 pi, times the slope
+    np.testing.assert_allclose(y, [*rise, *rise[:0:-1]], atol=1e-14)
+    assert signals.triangle(3.0, 1.0, 0.25, 5).tolist() == [-3, 0, 3, 0, -3]
+    late = signals.triangle(3.0, 1.0, 0.25, 4, 1.0, np.pi / 2)
+    np.testing.assert_allclose(late, [1, 4, 1, -2], atol=1e-14)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_triangle_is_the_arcsine_of_a_cosine(seed):
+    amplitude, f, bias, phase = np.random.default_rng(seed).uniform(0.5, 3, 4)
+    y = signals.triangle(amplitude, f, 0.013, 200, bias, phase)
+    angle = 2 * np.pi * f * 0.013 * np.arange(200) + phase
+    wave = -2 / np.pi * np.arcsin(np.cos(angle))
+    # arcsin loses half of the digits beside a tip
+    np.testing.assert_allclose(y, bias + amplitude * wave, atol=1e-7)
+    slipped = signals.triangle(amplitude, f, 0.013, 201, bias, phase)[1:]  # the mutant
+    assert np.abs(slipped - bias - amplitude * wave).max() > 0.01
+
+
+@pytest.mark.parametrize("arguments, message", [
+    ((np.nan, 4.0, 0.01, 5), r"amplitude = nan must be"),
+    (("2.5", 4.0, 0.01, 5), r"amplitude = '2\.5' must be"),
+    ((2.5, np.nan, 0.01, 5), r"triangle holds nan at sample 0; give finite"),
+    ((2.5, 4.0, np.nan, 5), r"triangle holds nan at sample 0; give finite"),
+    ((2.5, 4.0, 0.01, 5, np.nan), r"triangle holds nan at sample 0; give finite"),
+    ((2.5, 4.0, 0.01, 5, 0.0, np.nan), r"triangle holds nan at sample 0; give finite"),
+    ((2.5, 4.0, 0.01, 5.5), r"n = 5\.5 .*round"),
+    ((2.5, 4.0, 0.01, 0), r"n = 0 .*round"),
+])  # fmt: skip
+def test_triangle_refuses_bad_input(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        signals.triangle(*arguments)
+
+
 @pytest.mark.parametrize("n", [1, 3, 7, 8])
 def test_periodic_repeats_its_shape(n):
     shape = [1.0, -2.0, 5.0]
@@ -137,3 +175,12 @@ def test_one_sample_of_delay_at_six_per_turn_is_sixty_degrees_of_lag():
 def test_signal_names_the_first_bad_sample():
     with pytest.raises(ValueError, match=r"force .* sample 2"):
         signals.signal([0.0, 1.0, np.nan, np.inf], "force")
+
+
+def test_a_beat_that_ends_inside_the_band_has_not_settled():
+    """|sin| leaves the band 0.5 for ever; only the place where the record is cut hides it."""
+    y = np.sin(2 * np.pi * np.arange(121) / 12)
+    assert y[-1] == pytest.approx(0, abs=1e-12)
+    assert np.isfinite(signals.settling_time(y, 0.0, 0.5, 1.0))
+    assert signals.settling_time(y, 0.0, 0.5, 1.0, hold=12) == np.inf
+    assert signals.settling_time(np.append(y, np.zeros(12)), 0.0, 0.5, 1.0, hold=12) < np.inf

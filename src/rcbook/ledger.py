@@ -11,9 +11,11 @@ from __future__ import annotations
 import html
 import json
 import math
+import operator
 import re
 import string
 import tomllib
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from decimal import Decimal, InvalidOperation
@@ -29,11 +31,13 @@ NOT_COMPUTABLE = "not computable"
 VERDICTS = (REPRODUCED, CORRECTED, NOT_REPRODUCED, NOT_COMPUTABLE)
 KINDS = ("number", "list", "bound", "statement", "measurement")
 
+_ROUNDING = 1e-12  # of a value that lies on the end of an interval
 _LONG = 8  # a longer list is shown by its ends
 
 _NUMBER = r"[+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?"
-_ONE_SIDED = re.compile(rf"([<>])({_NUMBER})")
+_ONE_SIDED = re.compile(rf"([<>]=?)({_NUMBER})")
 _SYMMETRIC = re.compile(rf"\+-({_NUMBER})")
+_INSIDE = re.compile(rf"({_NUMBER})\.\.({_NUMBER})")
 _RANGE = re.compile(rf"({_NUMBER})<=?\w+<=?({_NUMBER})")
 
 
@@ -54,6 +58,7 @@ class Claim:
     convention: str = "primary"  # key of the paper's conventions
     erratum: str = ""  # key of the paper's errata
     reason: str = ""  # format string over the evidence
+    lost: str = ""  # what is lost that a computation would need, such as a figure
 
 
 @dataclass(frozen=True)
@@ -172,8 +177,8 @@ def _validate(claim: Claim, conventions: Mapping, errata: Mapping) -> None:
         problem = f"printed {claim.printed!r} cannot be read as a {claim.kind} (digits in quotes)"
     elif claim.tolerance is not None and tolerances(claim) is None:
         problem = f"a tolerance means nothing for {claim.printed!r}"
-    elif (claim.kind == "measurement") != (claim.expected == NOT_COMPUTABLE):
-        problem = "a measurement, and nothing else, is not computable"
+    elif _beyond_computation(claim) != (claim.expected == NOT_COMPUTABLE):
+        problem = "a measurement, or what says what is `lost`, is not computable, and nothing else"
     elif claim.expected in (NOT_REPRODUCED, NOT_COMPUTABLE) and not claim.reason:
         problem = "it is expected to fail and gives no reason"
     elif claim.expected == NOT_REPRODUCED and not _fields(claim.reason) - {"printed"}:
@@ -184,13 +189,17 @@ def _validate(claim: Claim, conventions: Mapping, errata: Mapping) -> None:
         raise ValueError(f"{claim.id}: {problem}")
 
 
+def _beyond_computation(claim: Claim) -> bool:
+    return claim.kind == "measurement" or bool(claim.lost)
+
+
 def _readable(claim: Claim) -> bool:
     if claim.kind in ("number", "list"):
         parts = claim.printed.split(";")
         alone = claim.kind == "list" or len(parts) == 1
         return alone and all(re.fullmatch(_NUMBER, part) for part in parts)
     return claim.kind != "bound" or any(
-        pattern.fullmatch(claim.printed) for pattern in (_ONE_SIDED, _SYMMETRIC, _RANGE)
+        pattern.fullmatch(claim.printed) for pattern in (_ONE_SIDED, _SYMMETRIC, _INSIDE, _RANGE)
     )
 
 
@@ -202,8 +211,8 @@ def agrees(claim: Claim, value: object) -> bool:
     """Whether `value` agrees with what `claim` prints.
 
     A number agrees within its tolerance; a list, number by number; a statement when it is True;
-    `<x` and `>x` when every value obeys; `+-x` when every value lies inside; and a range
-    `a<name<b` when the two computed ends agree with the two printed ones.
+    `<x`, `>x`, `<=x` and `>=x` when every value obeys; `+-x` and `a..b` when every value lies
+    inside; and a range `a<name<b` when the two computed ends agree with the two printed ones.
     Raises ValueError when the value has not the shape the claim asks for.
     """
     if claim.kind == "statement":
@@ -215,8 +224,11 @@ def agrees(claim: Claim, value: object) -> bool:
         raise ValueError(f"{claim.id}: give a number or a row of numbers, not {value!r}")
     if claim.kind == "bound":
         if match := _ONE_SIDED.fullmatch(claim.printed):
-            sign = 1.0 if match[1] == "<" else -1.0
-            return all(sign * v < sign * float(match[2]) for v in values)
+            obeys = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
+            return all(obeys[match[1]](v, float(match[2])) for v in values)
+        if match := _INSIDE.fullmatch(claim.printed):
+            low, high = (float(end) for end in match.groups())
+            return all(low - _ROUNDING <= v <= high + _ROUNDING for v in values)
         if match := _SYMMETRIC.fullmatch(claim.printed):
             return all(abs(v) <= float(match[1]) for v in values)
         match = _RANGE.fullmatch(claim.printed)
@@ -255,19 +267,23 @@ def judge(claim: Claim, value: object = None, corrected: object = None, **eviden
 
     The verdict is *reproduced* when `value` agrees; *reproduced with correction* when it does not
     and `corrected`, computed under the claim's erratum or convention, does; *not reproduced* when
-    neither does; *not computable* for a measurement.  `evidence` are the numbers and booleans
-    that the claim's reason quotes; `value`, `corrected` and `printed` may be quoted as well.
+    neither does; *not computable* for a measurement, or where what it needs is lost.  `evidence`
+    are the numbers and booleans that the claim's reason quotes; `value`, `corrected` and `printed`
+    may be quoted as well.
     An infinite value says that what is printed does not exist; the evidence then stands for it.
     """
-    if claim.kind == "measurement" and (value is not None or corrected is not None):
-        raise ValueError(f"{claim.id} is a measurement: pass what it means as evidence")
+    if _beyond_computation(claim) and (value is not None or corrected is not None):
+        raise ValueError(
+            f"{claim.id} is a {claim.kind} that cannot be computed (a measurement, or lost): "
+            "pass what it means as evidence"
+        )
     if taken := evidence.keys() & {"holds", "holds_corrected", "plain", "printed"}:
         raise ValueError(f"{claim.id}: evidence may not be called {', '.join(sorted(taken))}")
     value, corrected = _plain(claim, value), _plain(claim, corrected)
     evidence = {name: _plain(claim, item) for name, item in evidence.items()}
     if deep := [name for name, item in evidence.items() if isinstance(item, list)]:
         raise ValueError(f"{claim.id}: evidence {deep} is a list; name its numbers one by one")
-    if claim.kind == "measurement":
+    if _beyond_computation(claim):
         verdict, computed = NOT_COMPUTABLE, (evidence or None)
     elif value is None:
         raise ValueError(f"{claim.id}: a {claim.kind} needs a computed value")
@@ -278,7 +294,7 @@ def judge(claim: Claim, value: object = None, corrected: object = None, **eviden
         evidence = {"plain": value, **evidence} if claim.kind != "statement" else evidence
     else:
         verdict, computed = NOT_REPRODUCED, (evidence if value in (math.inf, -math.inf) else value)
-    if claim.kind == "statement":
+    if claim.kind == "statement" and value is not None:
         mended = {} if corrected is None else {"holds_corrected": corrected}
         computed = {"holds": value, **mended, **evidence}
     known = {**evidence, "value": value, "printed": claim.printed}
@@ -358,7 +374,17 @@ class Ledger:
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict:
         text = "\n".join(repr(self.judgements[id]) for id in self.judgements)
-        return {"text/plain": text, "text/html": table(self.rows()), MIME: self.rows()}
+        return {"text/plain": text, "text/html": self._html(), MIME: self.rows()}
+
+    def _html(self) -> str:
+        """Counts, and a table of the claims that are not simply reproduced."""
+        rows = self.rows()
+        tally = Counter(row["verdict"] for row in rows)
+        counts = "; ".join(f"{tally[verdict]} {verdict}" for verdict in VERDICTS)
+        rest = [
+            r for r in rows if (r["verdict"], r["expected_verdict"]) != (REPRODUCED, REPRODUCED)
+        ]
+        return f"<p>{len(rows)} claims: {counts}. All but the reproduced ones:</p>{table(rest)}"
 
 
 def _row(paper: Paper, judgement: Judgement) -> dict:
@@ -380,6 +406,7 @@ def _row(paper: Paper, judgement: Judgement) -> dict:
         "erratum": claim.erratum,
         "notebook": paper.notebook,
         "kind": claim.kind,
+        "reading": claim.convention,
         "evidence": _finite(dict(judgement.evidence)),
     }
 
@@ -414,8 +441,7 @@ def show_value(computed: object) -> str:
         if "holds" in computed:
             mended = "; corrected, it holds" if computed.get("holds_corrected") else ""
             return show_value(computed["holds"]) + mended
-        parts = computed.items()
-        return ", ".join(f"{name.replace('_', ' ')} {show_value(part)}" for name, part in parts)
+        return "see reason"
     if isinstance(computed, list) and len(computed) > _LONG:
         return f"{min(computed):.6g} to {max(computed):.6g} ({len(computed)} values)"
     if isinstance(computed, list):

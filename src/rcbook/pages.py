@@ -139,7 +139,8 @@ def _verdict(row: Mapping) -> str:
         anchor = _anchor(row["paper"], row["erratum"])
         shown += f'<br><small><a href="errata.html#{anchor}">erratum</a></small>'
     elif verdict == ledger.CORRECTED:
-        shown += f"<br><small>{_math(row['convention'])}</small>"
+        anchor = _anchor(row["paper"], f"reading-{row['reading']}")
+        shown += f'<br><small>reading <a href="errata.html#{anchor}">{row["reading"]}</a></small>'
     return shown
 
 
@@ -156,8 +157,11 @@ def errata_page(papers: Sequence[ledger.Paper], rows: Sequence[Mapping]) -> str:
         for key, erratum in paper.errata.items():
             decided = [r for r in rows if r["paper"] == paper.key and r["erratum"] == key]
             parts.append(_erratum(paper.key, key, erratum, decided))
-        readings = "\n\n".join(f"{key}\n: {text}" for key, text in paper.conventions.items())
-        parts += ["### Readings", "Where the print leaves a choice, we read it so.", readings]
+        parts += ["### Readings", "Where the print leaves a choice, we read it so."]
+        parts += [
+            f"({_anchor(paper.key, f'reading-{key}')})=\n#### {key}\n\n{text}"
+            for key, text in paper.conventions.items()
+        ]
     return "\n\n".join(parts) + "\n"
 
 
@@ -178,12 +182,10 @@ def _erratum(paper: str, key: str, erratum: Mapping[str, str], decided: Sequence
 def _deciding(row: Mapping) -> str:
     """One claim as a definition of the list, in HTML because its texts are no Markdown."""
     id = html.escape(row["id"])
-    reason = f": {_math(row['reason'])}" if row["reason"] else ""
-    printed = f"printed {_math(row['printed'])}, " if row["printed"] else ""
     return (
         f': <a href="ledger.html#{id}"><code>{id}</code></a> '
-        f'<span class="rcbook-verdict" data-verdict="{row["verdict"]}">{row["verdict"]}</span>, '
-        f"<span>{printed}ours {_math(ledger.show_value(row['computed']))}{reason}</span>"
+        f'<span class="rcbook-verdict" data-verdict="{row["verdict"]}">{row["verdict"]}</span>. '
+        f"<span>{_math(row['reason'])}</span>"
     )
 
 

@@ -79,3 +79,26 @@ def draw_locus(ax: Axes, loci: ArrayLike, label: str = "") -> Axes:
     loci = np.array([np.asarray(roots, dtype=complex) for roots in loci])
     ax.plot(loci.real.ravel(), loci.imag.ravel(), ".", markersize=2, label=label)
     return ax
+
+
+def draw_unit_disc(ax: Axes, centre: float = 1.0) -> Axes:
+    """The disc of radius one about `centre`, inside which G H must lie for passes to contract."""
+    ax.add_patch(plt.Circle((centre, 0), 1, facecolor="0.93", edgecolor=GREY, zorder=0))
+    ax.axhline(0, color="0.8", linewidth=0.8, linestyle="-", zorder=0)
+    ax.axvline(0, color="0.8", linewidth=0.8, linestyle="-", zorder=0)
+    ax.set_aspect("equal")
+    ax.set_xlabel("real part")
+    ax.set_ylabel("imaginary part")
+    return ax
+
+
+def draw_section(
+    ax: Axes, angle: ArrayLike, radius: ArrayLike, error: ArrayLike, magnified: float, label: str
+) -> Axes:
+    """One turn of a section in polar form (`ax` is polar), its error magnified along the radius."""
+    angle, drawn = np.asarray(angle), np.asarray(radius) - magnified * np.asarray(error)
+    ax.plot(np.append(angle, angle[0]), np.append(drawn, drawn[0]), label=label)
+    ax.set_xticks([])
+    ax.set_yticks([])
+    ax.grid(False)
+    return ax

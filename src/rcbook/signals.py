@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.signal
 from numpy.typing import ArrayLike
 
 from rcbook.zdomain import real_number, whole_number
@@ -41,6 +42,15 @@ def sinusoid(
     return signal(real_number(amplitude, "amplitude") * np.sin(angle), "sinusoid")
 
 
+def triangle(
+    amplitude: float, frequency: float, dt: float, n: int, bias: float = 0.0, phase: float = 0.0
+) -> np.ndarray:
+    """n samples of a triangular wave about `bias`; a lower tip lies at phase 0 (rad)."""
+    angle = 2 * np.pi * frequency * dt * np.arange(whole_number(n, "n")) + phase
+    wave = scipy.signal.sawtooth(angle, width=0.5)
+    return signal(bias + real_number(amplitude, "amplitude") * wave, "triangle")
+
+
 def periodic(shape: ArrayLike, n: int) -> np.ndarray:
     """n samples of the periodic signal whose one period is `shape`."""
     return np.resize(signal(shape, "shape"), whole_number(n, "n"))
@@ -73,12 +83,13 @@ def overshoot(y: ArrayLike, target: float) -> float:
     return max(0.0, 100 * float(np.max(signal(y) / target) - 1))
 
 
-def settling_time(y: ArrayLike, target: ArrayLike, band: float, dt: float) -> float:
+def settling_time(y: ArrayLike, target: ArrayLike, band: float, dt: float, hold: int = 1) -> float:
     """Time in s of the last entry into |y - target| <= band, counted from the first sample.
 
-    It is the instant of the first sample from which on no sample is outside; infinite when the
-    last sample is still outside, because the record then does not show a settled response.
-    `target` is one value or a signal as long as y.
+    It is the instant of the first sample from which on no sample is outside; infinite when not
+    even the last `hold` samples are inside, because the record then does not show a settled
+    response; an oscillation needs a hold of several of its periods.  `target` is one value or a
+    signal as long as y.
     Raises ValueError when the band or dt is not positive, or y and the target do not fit.
     """
     y, band = signal(y, "y"), real_number(band, "band", positive=True)
@@ -87,7 +98,8 @@ def settling_time(y: ArrayLike, target: ArrayLike, band: float, dt: float) -> fl
     outside = np.flatnonzero(np.abs(y - signal(target, "target", y.size)) > band)
     if outside.size == 0:
         return 0.0
-    return np.inf if outside[-1] == y.size - 1 else float((outside[-1] + 1) * dt)
+    unsettled = outside[-1] >= y.size - whole_number(hold, "hold")
+    return np.inf if unsettled else float((outside[-1] + 1) * dt)
 
 
 def harmonic(y: ArrayLike, period: int, order: int = 1) -> complex:

@@ -64,12 +64,14 @@ HORNG1989 = PeripheralMill(
 )
 
 
-def resample(plant: Plant, dt: float, fast_mode: str = "keep sign") -> Plant:
+def resample(plant: Plant, dt: float, fast_mode: str = "keep sign", sine: float = 0.0) -> Plant:
     """The plant at another sampling interval, mode by mode through its step response.
 
     A negative pole p has no real continuous counterpart; over a new interval of tau old ones it
     becomes -|p|^tau ("keep sign"), |p|^tau ("positive"), or the pair |p|^tau e^(+-j pi tau) of
-    a cosine that alternates at the old rate ("damped cosine").  Each keeps the gain of its mode;
+    a mode that alternates at the old rate, |p|^tau (cos pi tau + sine sin pi tau) ("damped
+    cosine"): a continuous-time machine for every `sine`, which the old samples do not show.  Each
+    keeps the gain of its mode;
     all but "positive" are exact for tau = 1.
     Raises ValueError for a delay other than 1, a numerator as long as the denominator, poles that
     are repeated, complex or 1, or an unknown mode.
@@ -85,7 +87,10 @@ def resample(plant: Plant, dt: float, fast_mode: str = "keep sign") -> Plant:
         )
     if fast_mode not in FAST_MODES:
         raise ValueError(f"fast_mode {fast_mode!r} is none of {', '.join(FAST_MODES)}")
-    modes = [_mode(pole, tau, fast_mode, _mode_gain(plant, pole, poles)) for pole in poles]
+    gains = [_mode_gain(plant, pole, poles) for pole in poles]
+    modes = [
+        _mode(pole, tau, fast_mode, sine, gain) for pole, gain in zip(poles, gains, strict=True)
+    ]
     denominator = multiply(*(den for _, den in modes))
     numerator = add(
         *(
@@ -103,7 +108,9 @@ def _mode_gain(plant: Plant, pole: float, poles: np.ndarray) -> float:
     return float(residue / (1 - pole))
 
 
-def _mode(pole: float, tau: float, fast_mode: str, gain: float) -> tuple[np.ndarray, np.ndarray]:
+def _mode(
+    pole: float, tau: float, fast_mode: str, sine: float, gain: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Numerator and denominator of one mode with the step response gain (1 - its decay)."""
     size = abs(pole) ** tau
     if pole > 0 or fast_mode == "positive":
@@ -112,8 +119,9 @@ def _mode(pole: float, tau: float, fast_mode: str, gain: float) -> tuple[np.ndar
         decay, den = np.array([1.0]), np.array([1.0, size])
     else:
         c = size * np.cos(np.pi * tau)
-        decay, den = np.array([1.0, -c]), np.array([1.0, -2 * c, size**2])
-        if abs(np.sin(np.pi * tau)) < 1e-12:
+        s = size * np.sin(np.pi * tau)
+        decay, den = np.array([1.0, sine * s - c]), np.array([1.0, -2 * c, size**2])
+        if abs(s) < 1e-12:
             decay, den = np.array([1.0]), np.array([1.0, -c])
     difference = np.array([1.0, -1.0])
     numerator = add(den, -multiply(difference, decay))
