@@ -234,6 +234,102 @@ def draw_plugin_loop(
     return draw_block_diagram(ax, items, wires)
 
 
+def draw_learning_loop(ax: Axes, law: str = "$H$", plant: str = "$G$") -> Axes:
+    """Draw learning from pass to pass: the error through the law corrects the next command."""
+    items = [
+        Block("memory", "memory of\none pass", (0.0, 0.0), fill=FOCUS),
+        Node("command", (3.2, 0.0)),
+        Block("plant", plant, (5.4, 0.0), fill=PLANT),
+        Sum("error", (8.0, 0.0), {"w": "−", "n": "+"}),
+        Block("law", law, (5.4, -2.0), fill=FOCUS),
+        Sum("corrected", (3.2, -2.0), {"n": "+", "e": "+"}),
+    ]
+    wires = [
+        Wire("memory", "command", "$y_{m,L}$"),
+        Wire("command", "plant"),
+        Wire("plant", "error", "$y_L$"),
+        Wire((8.0, 1.3), "error", "$y_r$"),
+        Wire("error", "law", "$e_L$", via=-2.0),
+        Wire("law", "corrected"),
+        Wire("command", "corrected"),
+        Wire("corrected", "memory", "$y_{m,L+1}$", via=-2.0),
+    ]
+    return draw_block_diagram(ax, items, wires)
+
+
+_CHUCK = (4.0, 4.6)  # spindle axis
+_TURNED = np.radians(62.0)  # angle of the part's first corner
+
+
+def draw_lathe_setup(ax: Axes) -> Axes:
+    """Draw noncircular turning, seen along the spindle: square part, tool, servo, computer."""
+    font = 1.08 * _fit(ax, (0.0, 0.0, 16.0, 8.4))
+    x, y = _CHUCK
+    ink = {"edgecolor": INK, "linewidth": _LINE}
+    ax.add_patch(Circle(_CHUCK, 3.3, facecolor=PAPER, zorder=0.5, **ink))
+    corners = [x + 2.6 * np.cos(_TURNED + k * np.pi / 2) for k in range(4)]
+    heights = [y + 2.6 * np.sin(_TURNED + k * np.pi / 2) for k in range(4)]
+    ax.add_patch(Polygon([*zip(corners, heights, strict=True)], facecolor=PLANT, **ink))
+    thin = {"color": INK, "linewidth": 0.8, "linestyle": "-"}
+    ax.plot([x, x + 4.6], [y, y], zorder=4, **thin)
+    ax.plot([x, corners[0]], [y, heights[0]], zorder=4, **thin)
+    sweep = np.linspace(0.0, _TURNED, 40)
+    ax.plot(x + 1.1 * np.cos(sweep), y + 1.1 * np.sin(sweep), zorder=4, **thin)
+    _draw_slide(ax, x + 2.6 * np.cos(np.pi / 4) / np.cos(_TURNED - np.pi / 4), y)
+    spin = np.radians(np.linspace(150.0, 195.0, 40))
+    ax.plot(x + 3.75 * np.cos(spin), y + 3.75 * np.sin(spin), color=INK, linewidth=1.6)
+    step = (-np.sin(spin[-1]), np.cos(spin[-1]))
+    _head(
+        ax,
+        (
+            x + 3.75 * np.cos(spin[-1]) + 0.25 * step[0],
+            y + 3.75 * np.sin(spin[-1]) + 0.25 * step[1],
+        ),
+        step,
+        INK,
+    )
+    for label in (
+        _Label(x - 0.6, y - 0.5, "part"),
+        _Label(x + 1.45, y + 0.45, r"$\theta$"),
+        _Label(x - 1.6, y + 2.25, "chuck"),
+        _Label(x + 4.9, y + 1.0, "tool"),
+    ):
+        _write(ax, label, font)
+    _draw_servo_path(ax, font)
+    return ax
+
+
+def _draw_slide(ax: Axes, tip: float, y: float) -> None:
+    """The tool with its tip on the part, and the slide that carries it."""
+    ink = {"edgecolor": INK, "linewidth": _LINE}
+    outline = [(tip, y), (tip + 0.7, y + 0.3), (tip + 2.0, y + 0.3), (tip + 2.0, y - 0.3)]
+    ax.add_patch(Polygon([*outline, (tip + 0.7, y - 0.3)], facecolor="#c4c4c4", zorder=5, **ink))
+    ax.add_patch(Rectangle((tip + 2.0, y - 0.75), 2.2, 1.5, facecolor=PAPER, zorder=2, **ink))
+    ax.plot([tip + 2.4, tip + 3.8], [y, y], color=INK, linewidth=2.0, linestyle="-", zorder=6)
+    _head(ax, (tip + 4.05, y), (1, 0), INK, scale=1.2)
+    _head(ax, (tip + 2.15, y), (-1, 0), INK, scale=1.2)
+
+
+def _draw_servo_path(ax: Axes, font: float) -> None:
+    """Servo with its encoder, computer, and the encoder of the spindle."""
+    x, y = _CHUCK
+    items = [
+        Node("spindle", (x, y - 3.3)),
+        Block("servo", "servo and\nencoder", (13.9, y), width=2.9, height=1.7),
+        Block("computer", "computer", (9.5, 0.9), fill=FOCUS, width=3.0, height=1.3),
+    ]
+    wires = [
+        Wire("servo", (10.05, y)),
+        Wire("spindle", "computer", r"spindle angle $\theta$", via=0.9),
+        Wire("computer", "servo", "command $y_m$", via=0.9),
+        Wire("servo", "computer", "position $y$", via=2.6),
+    ]
+    by_name = _by_name(items)
+    routes = [_route(wire, by_name) for wire in wires]
+    routes[3] = [(13.2, y - 0.85), (13.2, 2.7), (9.5, 2.7), (9.5, 1.55)]
+    _paint(ax, items, wires, routes, _labels(items, wires, routes), font)
+
+
 def draw_repetitive_generator(
     ax: Axes,
     gain: str = r"$k_r$",

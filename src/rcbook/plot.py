@@ -101,4 +101,5 @@ def draw_section(
     ax.set_xticks([])
     ax.set_yticks([])
     ax.grid(False)
+    ax.spines["polar"].set_visible(False)
     return ax

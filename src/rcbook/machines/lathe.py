@@ -1,0 +1,84 @@
+"""Noncircular turning: the radial servo of a lathe, and sections as functions of spindle angle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rcbook.zdomain import Plant, multiply, real_number, whole_number
+
+
+@dataclass(frozen=True)
+class Servo:
+    """Servo gain z^-1 prod(1 + q z^-1)/prod(1 + p z^-1), command to position in mm/mm.
+
+    Zeros and poles are given by their coefficients q and p, minus the roots; complex ones come in
+    conjugate pairs.  Source: Lee, Oh and Kim, eqs 9-10, with gain and delay written out.
+    """
+
+    gain: float
+    zeros: tuple[complex, ...]
+    poles: tuple[complex, ...]
+    dt: float  # s
+
+    @property
+    def plant(self) -> Plant:
+        """The servo as a sampled plant.  Raises ValueError when a conjugate is missing."""
+        b, a = _product(self.zeros), _product(self.poles)
+        return Plant(real_number(self.gain, "gain") * b, a, 1, self.dt)
+
+    def misjudged(self, zeros: float = 1.0, poles: float = 1.0) -> Servo:
+        """The servo as an identification sees it that is off by these factors; the gain stays."""
+        zeros, poles = real_number(zeros, "zeros"), real_number(poles, "poles")
+        scaled = (tuple(f * c for c in cs) for f, cs in ((zeros, self.zeros), (poles, self.poles)))
+        return replace(self, **dict(zip(("zeros", "poles"), scaled, strict=True)))
+
+
+def _product(coefficients: tuple[complex, ...]) -> np.ndarray:
+    product = multiply(*(np.array([1.0, c]) for c in coefficients))
+    if np.abs(np.imag(product)).max() > 1e-12 * np.abs(product).max():
+        raise ValueError(f"{coefficients} holds a complex coefficient without its conjugate")
+    return np.real(product)
+
+
+ELECTRIC_SERVO = Servo(0.14, (0.77, 2.43), (0.14, -0.15 + 0.15j, -0.15 - 0.15j), 0.01)  # eq. 13
+NC_LATHE = Servo(0.046, (3.0,), (-0.6 + 0.15j, -0.6 - 0.15j), 0.01)  # eq. 21
+
+
+def samples_per_turn(speed: float, dt: float) -> float:
+    """Samples per spindle turn at a speed in rpm, whole or not (Lee, Oh and Kim, eq. 1)."""
+    speed, dt = real_number(speed, "speed", positive=True), real_number(dt, "dt", positive=True)
+    return 60 / (speed * dt)
+
+
+def spindle_angle(n: int, per_turn: float, start: float = 0.0) -> np.ndarray:
+    """Spindle angle in rad at n samples, `per_turn` of them to a turn, from the angle `start`."""
+    per_turn = real_number(per_turn, "per_turn", positive=True)
+    start = real_number(start, "start")
+    return start + 2 * np.pi * np.arange(whole_number(n, "n")) / per_turn
+
+
+def polygon_section(angle: ArrayLike, sides: int, inradius: float) -> np.ndarray:
+    """Radius of a regular polygon at a spindle angle, with the middle of a side at angle 0.
+
+    Corners lie at odd multiples of pi/sides; a square of side 2a has the inradius a.
+    """
+    half = np.pi / whole_number(sides, "sides", 3)
+    folded = np.mod(_finite(angle) + half, 2 * half) - half
+    return real_number(inradius, "inradius", positive=True) / np.cos(folded)
+
+
+def ellipse_section(angle: ArrayLike, a: float, b: float) -> np.ndarray:
+    """Radius of an ellipse about its centre, half axes a (at angle 0) and b."""
+    a, b = real_number(a, "a", positive=True), real_number(b, "b", positive=True)
+    angle = _finite(angle)
+    return a * b / np.hypot(b * np.cos(angle), a * np.sin(angle))
+
+
+def _finite(angle: ArrayLike) -> np.ndarray:
+    angle = np.asarray(angle, dtype=float)
+    if not np.all(np.isfinite(angle)):
+        raise ValueError(f"angle = {angle} holds NaN or infinity; give finite angles")
+    return angle
