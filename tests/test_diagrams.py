@@ -17,6 +17,7 @@ from matplotlib.transforms import Bbox
 
 from rcbook import diagrams
 from rcbook.diagrams import Block, Frame, Node, Sum, Wire, draw_block_diagram
+from rcbook.machines import lathe
 
 F_REF, V_PI = r"$F_\mathrm{ref}$", r"$V_\mathrm{PI}$"
 
@@ -185,7 +186,7 @@ def test_arrow_tips_lie_on_the_outlines_they_point_at():
     assert tips == {(-1.0, 0.0), (4.0 - radius, 0.0), (4.0, radius), (0.0, -0.5)}  # none at a dot
 
 
-@pytest.mark.parametrize("name", LAYOUTS.keys() - {"milling", "lathe"})
+@pytest.mark.parametrize("name", sorted(LAYOUTS.keys() - {"milling", "lathe"}))
 def test_every_arrow_of_a_layout_ends_on_ink_or_is_the_output(name):
     _, ax = rendered(LAYOUTS[name])
     boxes, circles = outlines(ax)
@@ -229,8 +230,8 @@ def test_texts_stay_inside_the_figure_and_apart(name, size):
 
 
 @pytest.mark.parametrize("size", [(8.0, 4.2), (5.0, 3.0)])
-@pytest.mark.parametrize("name", LAYOUTS.keys() - {"lathe"})  # its words stand in the chuck
-def test_text_is_inside_a_block_or_clear_of_all_of_them(name, size):
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_text_is_inside_a_shape_or_clear_of_all_of_them(name, size):
     _, ax = rendered(LAYOUTS[name], size)
     blocks = [p.get_window_extent() for p in ax.patches if isinstance(p, FancyBboxPatch)]
     circles = [p.get_window_extent() for p in ax.patches if isinstance(p, Circle)]
@@ -241,7 +242,8 @@ def test_text_is_inside_a_block_or_clear_of_all_of_them(name, size):
             assert inside or not box.overlaps(block), text
         for x, y, radius in circles:
             nearest = np.clip(x, box.x0, box.x1), np.clip(y, box.y0, box.y1)
-            assert np.hypot(nearest[0] - x, nearest[1] - y) > radius, text
+            clear = np.hypot(nearest[0] - x, nearest[1] - y) > radius
+            assert clear or np.hypot(*(box.corners() - (x, y)).T).max() < radius, text
 
 
 @pytest.mark.parametrize("size", [(8.0, 4.2), (5.0, 3.0)])
@@ -279,6 +281,7 @@ def test_fills_differ_in_grey():
     """Outlines do the work; the tints of machine and controller only must not fall together."""
     for one, other in combinations((diagrams.PAPER, diagrams.PLANT, diagrams.FOCUS), 2):
         assert contrast(one, other) > 1.15
+    assert contrast(diagrams.PLANT, diagrams.STEEL) > 1.15  # a turned section on its bar
 
 
 def test_a_drawing_keeps_its_scale_when_the_figure_is_large():
@@ -294,6 +297,41 @@ def test_text_and_drawing_shrink_together():
         unit = np.ptp(ax.transData.transform([(0, 0), (1, 0)])[:, 0])
         sizes[width] = ax.texts[0].get_fontsize() * figure.dpi / unit
     assert sizes[4.0] == pytest.approx(sizes[2.0], rel=1e-6)
+
+
+# --- the learning loop ---------------------------------------------------------------------------
+
+
+def test_learning_names_every_signal_of_a_pass():
+    _, ax = rendered(diagrams.draw_learning_loop)
+    words = [t.get_text() for t in ax.texts]
+    signals = ("$y_r$", "$e_L$", "$y_{m,L}$", "$y_{m,L+1}$", "$y_L$")
+    assert [words.count(s) for s in (*signals, "$G$", "$H$", "memory of\none pass")] == [1] * 8
+    assert (words.count("+"), words.count("−")) == (3, 1)
+
+
+def test_learning_goes_round_from_memory_to_plant_to_law_to_memory():
+    """Above to the right, below to the left: every text where its signal is."""
+    _, ax = rendered(diagrams.draw_learning_loop)
+    at = {t.get_text(): t.get_position() for t in ax.texts}
+    above = [at[text] for text in ("memory of\none pass", "$y_{m,L}$", "$G$", "$y_L$", "$y_r$")]
+    below = [at[text] for text in ("$y_{m,L+1}$", "$H$", "$e_L$")]
+    assert above == sorted(above)
+    assert below == sorted(below)
+    assert max(y for _, y in below) < min(y for _, y in above)
+
+
+def test_the_position_is_subtracted_and_only_the_position():
+    _, ax = rendered(diagrams.draw_learning_loop)
+    at = {t.get_text(): np.array(t.get_position()) for t in ax.texts}
+    x, y, radius = max(outlines(ax)[1])  # the sum on the right
+    np.testing.assert_allclose(at["−"] - (x, y), diagrams._SIGN_SPOTS["w"])
+    (wire,) = (
+        c.get_xydata()
+        for c in ax.lines
+        if np.all(c.get_ydata() == y) and c.get_xdata()[0] > at["$G$"][0]
+    )
+    assert wire[0, 0] < at["$y_L$"][0] < wire[-1, 0] < x - radius  # the rest is its head
 
 
 # --- the milling machine -------------------------------------------------------------------------
@@ -321,6 +359,71 @@ def test_the_drawn_edge_repeats_once_per_turn():
     x = np.linspace(diagrams._SPINDLE[0] + diagrams._TURN, 6.4, 400)
     one_turn_on = diagrams._cut_edge(x + diagrams._TURN)
     np.testing.assert_allclose(diagrams._cut_edge(x), one_turn_on, atol=1e-9)
+
+
+# --- the lathe -----------------------------------------------------------------------------------
+
+
+def test_lathe_names_every_part_of_the_loop():
+    _, ax = rendered(diagrams.draw_lathe_setup)
+    words = " ".join(t.get_text().replace("\n", " ") for t in ax.texts)
+    parts = ("workpiece", "tool", "slide", "servo motor", "spindle encoder", "computer", "10 mm")
+    signals = (r"angle $\theta$", "command $y_m$", "position $y$", r"$y_r(\theta)$")
+    assert [part for part in (*parts, *signals) if part not in words] == []
+    assert words.count("encoder") == 2
+
+
+def test_words_on_the_turned_section_are_readable():
+    _, ax = rendered(diagrams.draw_lathe_setup)
+    assert min(contrast(t.get_color(), diagrams.STEEL) for t in ax.texts) >= 4.5
+
+
+def test_the_drawn_radius_is_that_of_the_section_the_chapter_cuts():
+    angle = np.linspace(-1.0, 8.0, 500)
+    section = lathe.polygon_section(angle, 4, diagrams._INRADIUS)
+    np.testing.assert_allclose(diagrams._square_radius(angle), section, rtol=1e-12)
+
+
+def test_the_tool_touches_the_section_and_does_not_enter_it():
+    _, ax = rendered(diagrams.draw_lathe_setup)
+    corners = [p.get_xy()[:-1] for p in ax.patches if isinstance(p, Polygon)]
+    (square,) = (c for c in corners if np.allclose(np.mean(c, axis=0), diagrams._CENTRE))
+    (tool,) = (c for c in corners if len(c) == 4 and np.isclose(c[:, 0].max(), diagrams._SLIDE[0]))
+    normal = square[[0, -1]].mean(axis=0) - diagrams._CENTRE  # of the side that faces the tool
+    assert np.hypot(*normal) == pytest.approx(diagrams._INRADIUS)
+    assert np.degrees(np.arctan2(normal[1], normal[0])) == pytest.approx(-30.0)  # turned clockwise
+    depth = (tool - diagrams._CENTRE) @ normal / diagrams._INRADIUS - diagrams._INRADIUS
+    assert depth[0] == pytest.approx(0.0, abs=1e-12)
+    assert depth[1:].min() > 0.0
+
+
+def test_the_section_fits_into_its_bar_and_the_bar_into_the_chuck():
+    assert np.sqrt(2) * diagrams._INRADIUS < diagrams._BAR < diagrams._CHUCK
+
+
+def test_the_graph_marks_the_radius_at_the_tool():
+    """One turn is the width of the graph; heights run from the inradius to the corner."""
+    _, ax = rendered(diagrams.draw_lathe_setup)
+    left, right, bottom, top = diagrams._PLOT
+    ((x, y, _),) = (c for c in outlines(ax)[1] if left < c[0] < right and c[1] > bottom)
+    share = (1 / np.cos(diagrams._ANGLE) - 1) / (np.sqrt(2) - 1)
+    assert (x - left) / (right - left) == pytest.approx(30 / 360)
+    assert (y - bottom) / (top - bottom) == pytest.approx(share, abs=1e-3)
+
+
+def test_lathe_wires_end_on_the_blocks_they_feed():
+    """Angle and position arrive at the computer, the command at the motor."""
+    _, ax = rendered(diagrams.draw_lathe_setup)
+    at = {t.get_text(): t.get_position() for t in ax.texts}
+    sizes = {(round(x + w / 2, 6), round(y + h / 2, 6)): (w, h) for x, y, w, h in outlines(ax)[0]}
+    (x, y), (width, height) = at["computer"], sizes[at["computer"]]
+    motor = at["servo\nmotor"]
+    below_motor = (motor[0], motor[1] - sizes[motor][1] / 2)
+    for tip in ((x - width / 2, y), (x, y - height / 2), below_motor):
+        assert sum(np.allclose(head, tip) for head in heads(ax)) == 1
+
+
+# --- waviness ------------------------------------------------------------------------------------
 
 
 def profile(eccentricity):
@@ -372,9 +475,10 @@ def test_fonts_are_those_that_ship_with_matplotlib():
     assert plt.rcParams["mathtext.fontset"] == "dejavusans"
 
 
-def test_the_same_drawing_gives_the_same_file(tmp_path):
+@pytest.mark.parametrize("draw", [diagrams.draw_milling_setup, diagrams.draw_lathe_setup])
+def test_the_same_drawing_gives_the_same_file(tmp_path, draw):
     for name in ("first.svg", "second.svg"):
-        figure, _ = rendered.__wrapped__(diagrams.draw_milling_setup)
+        figure, _ = rendered.__wrapped__(draw)
         figure.savefig(tmp_path / name, metadata={"Date": None})
     assert (tmp_path / "first.svg").read_bytes() == (tmp_path / "second.svg").read_bytes()
 

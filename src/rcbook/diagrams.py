@@ -24,6 +24,7 @@ DISTURBED = "#9c3a00"  # a darkened Okabe-Ito vermilion: 7:1 on white
 PAPER = "#ffffff"
 PLANT = "#ececec"  # fill of the machine
 FOCUS = "#bad8f0"  # fill of what the picture is about; darker than PLANT in grey, too
+STEEL = "#c4c4c4"  # fill of the cutter and of a turned section
 
 Point = tuple[float, float]
 
@@ -108,6 +109,9 @@ class _Label(NamedTuple):
     ha: str = "center"
     va: str = "center"
     color: str = INK
+
+
+_Note = tuple[_Label, tuple[Point, Point] | None]  # words, and a line from them to what they name
 
 
 def draw_block_diagram(ax: Axes, items: Sequence[Item], wires: Sequence[Wire]) -> Axes:
@@ -257,79 +261,6 @@ def draw_learning_loop(ax: Axes, law: str = "$H$", plant: str = "$G$") -> Axes:
     return draw_block_diagram(ax, items, wires)
 
 
-_CHUCK = (4.0, 4.6)  # spindle axis
-_TURNED = np.radians(62.0)  # angle of the part's first corner
-
-
-def draw_lathe_setup(ax: Axes) -> Axes:
-    """Draw noncircular turning, seen along the spindle: square part, tool, servo, computer."""
-    font = 1.08 * _fit(ax, (0.0, 0.0, 16.0, 8.4))
-    x, y = _CHUCK
-    ink = {"edgecolor": INK, "linewidth": _LINE}
-    ax.add_patch(Circle(_CHUCK, 3.3, facecolor=PAPER, zorder=0.5, **ink))
-    corners = [x + 2.6 * np.cos(_TURNED + k * np.pi / 2) for k in range(4)]
-    heights = [y + 2.6 * np.sin(_TURNED + k * np.pi / 2) for k in range(4)]
-    ax.add_patch(Polygon([*zip(corners, heights, strict=True)], facecolor=PLANT, **ink))
-    thin = {"color": INK, "linewidth": 0.8, "linestyle": "-"}
-    ax.plot([x, x + 4.6], [y, y], zorder=4, **thin)
-    ax.plot([x, corners[0]], [y, heights[0]], zorder=4, **thin)
-    sweep = np.linspace(0.0, _TURNED, 40)
-    ax.plot(x + 1.1 * np.cos(sweep), y + 1.1 * np.sin(sweep), zorder=4, **thin)
-    _draw_slide(ax, x + 2.6 * np.cos(np.pi / 4) / np.cos(_TURNED - np.pi / 4), y)
-    spin = np.radians(np.linspace(150.0, 195.0, 40))
-    ax.plot(x + 3.75 * np.cos(spin), y + 3.75 * np.sin(spin), color=INK, linewidth=1.6)
-    step = (-np.sin(spin[-1]), np.cos(spin[-1]))
-    _head(
-        ax,
-        (
-            x + 3.75 * np.cos(spin[-1]) + 0.25 * step[0],
-            y + 3.75 * np.sin(spin[-1]) + 0.25 * step[1],
-        ),
-        step,
-        INK,
-    )
-    for label in (
-        _Label(x - 0.6, y - 0.5, "part"),
-        _Label(x + 1.45, y + 0.45, r"$\theta$"),
-        _Label(x - 1.6, y + 2.25, "chuck"),
-        _Label(x + 4.9, y + 1.0, "tool"),
-    ):
-        _write(ax, label, font)
-    _draw_servo_path(ax, font)
-    return ax
-
-
-def _draw_slide(ax: Axes, tip: float, y: float) -> None:
-    """The tool with its tip on the part, and the slide that carries it."""
-    ink = {"edgecolor": INK, "linewidth": _LINE}
-    outline = [(tip, y), (tip + 0.7, y + 0.3), (tip + 2.0, y + 0.3), (tip + 2.0, y - 0.3)]
-    ax.add_patch(Polygon([*outline, (tip + 0.7, y - 0.3)], facecolor="#c4c4c4", zorder=5, **ink))
-    ax.add_patch(Rectangle((tip + 2.0, y - 0.75), 2.2, 1.5, facecolor=PAPER, zorder=2, **ink))
-    ax.plot([tip + 2.4, tip + 3.8], [y, y], color=INK, linewidth=2.0, linestyle="-", zorder=6)
-    _head(ax, (tip + 4.05, y), (1, 0), INK, scale=1.2)
-    _head(ax, (tip + 2.15, y), (-1, 0), INK, scale=1.2)
-
-
-def _draw_servo_path(ax: Axes, font: float) -> None:
-    """Servo with its encoder, computer, and the encoder of the spindle."""
-    x, y = _CHUCK
-    items = [
-        Node("spindle", (x, y - 3.3)),
-        Block("servo", "servo and\nencoder", (13.9, y), width=2.9, height=1.7),
-        Block("computer", "computer", (9.5, 0.9), fill=FOCUS, width=3.0, height=1.3),
-    ]
-    wires = [
-        Wire("servo", (10.05, y)),
-        Wire("spindle", "computer", r"spindle angle $\theta$", via=0.9),
-        Wire("computer", "servo", "command $y_m$", via=0.9),
-        Wire("servo", "computer", "position $y$", via=2.6),
-    ]
-    by_name = _by_name(items)
-    routes = [_route(wire, by_name) for wire in wires]
-    routes[3] = [(13.2, y - 0.85), (13.2, 2.7), (9.5, 2.7), (9.5, 1.55)]
-    _paint(ax, items, wires, routes, _labels(items, wires, routes), font)
-
-
 def draw_repetitive_generator(
     ax: Axes,
     gain: str = r"$k_r$",
@@ -410,16 +341,11 @@ def draw_milling_setup(ax: Axes) -> Axes:
     _draw_workpiece(ax, font)
     _draw_cutter(ax)
     _draw_signal_path(ax, font)
-    for label, target in _milling_notes():
-        _write(ax, label, font)
-        if target is not None:
-            anchor, tip = target
-            line = {"color": label.color, "linewidth": 0.8, "linestyle": "-"}
-            ax.plot(*zip(anchor, tip, strict=True), zorder=4, **line)
+    _annotate(ax, _milling_notes(), font)
     return ax
 
 
-def _milling_notes() -> list[tuple[_Label, tuple[Point, Point] | None]]:
+def _milling_notes() -> list[_Note]:
     """The words on the picture, and the line from a word to what it names."""
     x, y = _cutter_axis()
     rim = (_SPINDLE[0] - 1.06, _SPINDLE[1] + 0.62)
@@ -441,7 +367,7 @@ def _draw_table(ax: Axes) -> None:
     ink = {"edgecolor": INK, "linewidth": _LINE}
     ax.add_patch(Rectangle((0.3, 0.2), 9.0, 3.2, facecolor=PAPER, zorder=0.5, **ink))
     for y in (1.5, 2.5):
-        ax.plot([0.36, 9.24], [y, y], color="#c4c4c4", linewidth=2.5, linestyle="-", zorder=0.6)
+        ax.plot([0.36, 9.24], [y, y], color=STEEL, linewidth=2.5, linestyle="-", zorder=0.6)
     ax.add_patch(Rectangle((0.8, 1.08), 7.8, 2.0, facecolor=FOCUS, zorder=0.7, **ink))
     ax.plot([5.45, 6.8], [0.62, 0.62], color=INK, linewidth=2.2, linestyle="-")
     _head(ax, (7.1, 0.62), (1, 0), INK, scale=1.5)
@@ -457,9 +383,7 @@ def _draw_workpiece(ax: Axes, font: float) -> None:
     style = {"color": INK, "linewidth": 0.8, "linestyle": "-"}
     for end in crest:
         ax.plot([end, end], [y.max() - 0.2, y.max() + 0.35], **style)
-    ax.plot(crest, [y.max() + 0.2] * 2, **style)
-    for end, way in zip(crest, (-1, 1), strict=True):
-        _head(ax, (end, y.max() + 0.2), (way, 0), INK, scale=0.8)
+    _double_arrow(ax, (crest[0], y.max() + 0.2), (crest[1], y.max() + 0.2))
     _write(ax, _Label(crest[0] - 0.25, y.max() + 0.62, "one wave per turn", "left"), font)
 
 
@@ -484,7 +408,7 @@ def _draw_cutter(ax: Axes) -> None:
     """Cutter, both axes, the circle that its outermost tooth sweeps, and the sense of rotation."""
     (x, y), axis = _SPINDLE, _cutter_axis()
     outline = _flutes() + axis
-    ax.add_patch(Polygon(outline, facecolor="#c4c4c4", edgecolor=INK, linewidth=_LINE, zorder=2))
+    ax.add_patch(Polygon(outline, facecolor=STEEL, edgecolor=INK, linewidth=_LINE, zorder=2))
     swept = {"fill": False, "linestyle": (0, (5, 3)), "linewidth": 0.8, "edgecolor": INK}
     ax.add_patch(Circle(_SPINDLE, _CUTTER + _OFFSET, zorder=3, **swept))
     offset = {"color": DISTURBED, "linewidth": 2.4, "linestyle": "-"}
@@ -493,11 +417,7 @@ def _draw_cutter(ax: Axes) -> None:
     for dx, dy in ((0.17, 0.0), (0.0, 0.17)):
         cross = {"color": INK, "linewidth": 1.5, "linestyle": "-"}
         ax.plot([x - dx, x + dx], [y - dy, y + dy], zorder=5, **cross)
-    turn = np.radians(np.linspace(125.0, 62.0, 60))  # clockwise, as seen from the spindle
-    arc = np.column_stack([x + 2.0 * np.cos(turn), y + 2.0 * np.sin(turn)])
-    ax.plot(*arc.T, color=INK, linewidth=1.6, linestyle="-")
-    step = np.array([np.sin(turn[-1]), -np.cos(turn[-1])])
-    _head(ax, tuple(arc[-1] + 0.25 * step), tuple(step), INK, scale=1.2)
+    _clockwise(ax, _SPINDLE, 2.0, (125.0, 62.0))  # as seen from the spindle
 
 
 def _flutes() -> np.ndarray:
@@ -528,6 +448,147 @@ def _draw_signal_path(ax: Axes, font: float) -> None:
     routes = [_route(wire, by_name) for wire in wires]
     routes[0] = [(8.35, 2.3), (10.3, 2.3), (10.3, 7.2), (x - 1.6, 7.2)]
     _paint(ax, items, wires, routes, _labels(items, wires, routes), font)
+
+
+# --- the lathe -----------------------------------------------------------------------------------
+
+_CENTRE = (3.1, 5.1)  # of the spindle
+_INRADIUS = 1.3  # of the square section, which stands for 10 mm
+_ANGLE = np.radians(30.0)  # by which the spindle has turned since a side faced the tool
+_BAR, _CHUCK = 2.0, 2.55  # radii
+_SLIDE = (6.9, 9.2)  # left and right end
+_SCREW = 4.55  # height
+_PLOT = (10.9, 15.4, 6.35, 7.5)  # left, right, bottom and top of the radius over one turn
+
+
+def draw_lathe_setup(ax: Axes) -> Axes:
+    """Draw noncircular turning seen along the spindle axis, and the signals around the computer.
+
+    A square of half side a = 10 mm is turned on a round bar; the graph is its radius over one
+    turn.  Made for a figure of about 8 by 4.2 inches.
+    """
+    font = 1.08 * _fit(ax, (0.0, 0.0, 16.0, 8.4))
+    _draw_chuck(ax)
+    _draw_section(ax)
+    _draw_slide(ax)
+    _draw_lathe_signals(ax, font)
+    _draw_radius(ax)
+    _annotate(ax, _lathe_notes(), font)
+    return ax
+
+
+def _lathe_notes() -> list[_Note]:
+    """The words on the picture, and the line from a word to what it names."""
+    x, y = _CENTRE
+    left, right, bottom, top = _PLOT
+    return [
+        (_Label(x + 0.72, y + 0.3, r"$y_r(\theta)$"), None),
+        (_Label(x + 1.06, y - 0.29, r"$\theta$"), None),
+        (_Label(x - 0.42, y + 0.58, "$a$"), None),
+        (_Label(5.75, 7.0, "workpiece", "left"), ((5.65, 6.9), (x + 1.3, y + 0.75))),
+        (_Label(6.22, 4.2, "tool"), None),
+        (_Label(sum(_SLIDE) / 2, _SCREW, "slide"), None),
+        (_Label(_SLIDE[0] + 0.02, 5.86, "$y$"), None),
+        (_Label(left - 0.25, bottom, "$a$ = 10 mm", "right"), None),
+        (_Label(left - 0.25, top, r"$\sqrt{2}\,a$ = 14 mm", "right"), None),
+        (_Label((left + right) / 2, 8.1, r"radius $y_r(\theta)$, one turn"), None),
+    ]
+
+
+def _square_radius(angle: np.ndarray | float) -> np.ndarray:
+    """Radius of the square at an angle from the middle of a side."""
+    return _INRADIUS / np.cos(np.mod(np.asarray(angle) + np.pi / 4, np.pi / 2) - np.pi / 4)
+
+
+def _around(radius: np.ndarray | float, angle: np.ndarray | float) -> np.ndarray:
+    """Points about the spindle axis at an angle on the workpiece; the tool is at `_ANGLE`."""
+    turned = np.asarray(angle) - _ANGLE  # the spindle turns clockwise
+    offset = np.stack([np.cos(turned), np.sin(turned)], axis=-1)
+    return np.asarray(radius)[..., None] * offset + _CENTRE
+
+
+def _draw_chuck(ax: Axes) -> None:
+    """Chuck with three jaws, the round bar in it, and the sense of rotation."""
+    ink = {"edgecolor": INK, "linewidth": _LINE}
+    ax.add_patch(Circle(_CENTRE, _CHUCK, facecolor=PAPER, zorder=0.5, **ink))
+    for middle in np.radians([100.0, 220.0, 340.0]):
+        along, across = _around(1.0, middle) - _CENTRE, _around(1.0, middle + np.pi / 2) - _CENTRE
+        jaw = [
+            along * reach + across * side + _CENTRE
+            for reach, side in ((1.8, -0.38), (2.42, -0.38), (2.42, 0.38), (1.8, 0.38))
+        ]
+        ax.add_patch(Polygon(jaw, facecolor=PAPER, zorder=0.6, **ink))
+    ax.add_patch(Circle(_CENTRE, _BAR, facecolor=PLANT, zorder=0.7, **ink))
+    _clockwise(ax, _CENTRE, _CHUCK + 0.32, (124.0, 66.0))
+
+
+def _draw_section(ax: Axes) -> None:
+    """The turned square with its half side, its radius at the tool, and the spindle angle."""
+    corners = np.pi / 4 + np.pi / 2 * np.arange(4)
+    square = _around(_square_radius(corners), corners)
+    ax.add_patch(Polygon(square, facecolor=STEEL, edgecolor=INK, linewidth=1.5, zorder=0.8))
+    thin = {"color": INK, "linewidth": 0.8}
+    mark = np.stack([_around(0.0, 0.0), _around(_CHUCK, 0.0)])
+    ax.plot(*mark.T, linestyle=(0, (7, 2.5, 1.5, 2.5)), zorder=1, **thin)
+    _double_arrow(ax, _CENTRE, tuple(_around(_INRADIUS, np.pi)))
+    _double_arrow(ax, _CENTRE, tuple(_around(_square_radius(_ANGLE), _ANGLE)), 1.6)
+    arc = _around(0.78, np.linspace(_ANGLE, 0.2 * _ANGLE, 30))
+    ax.plot(*arc.T, linestyle="-", **thin)
+    step = _around(1.0, -np.pi / 2 + 0.1 * _ANGLE) - _CENTRE
+    _head(ax, tuple(_around(0.78, 0.0)), tuple(step), INK, scale=0.8)
+    ax.add_patch(Circle(_CENTRE, _DOT, facecolor=INK, linewidth=0, zorder=4))
+
+
+def _draw_slide(ax: Axes) -> None:
+    """Tool with its edge on the section, slide on its way, and the screw that moves it."""
+    tip, (left, right) = _around(_square_radius(_ANGLE), _ANGLE), _SLIDE
+    ink = {"edgecolor": INK, "linewidth": _LINE}
+    shank = [(0.0, 0.0), (0.22, -0.5), (left - tip[0], -0.5), (left - tip[0], 0.0)]
+    ax.add_patch(Polygon(tip + shank, facecolor="#6e6e6e", zorder=2, **ink))
+    ax.add_patch(Rectangle((6.3, 3.25), 4.4, 0.4, facecolor=PAPER, hatch="////", **ink))
+    ax.add_patch(Rectangle((left, 3.65), right - left, 1.8, facecolor=PLANT, zorder=3, **ink))
+    turns = np.linspace(right, 11.2, 23)
+    for side in (-0.11, 0.11):
+        ax.plot(turns[[0, -1]], [_SCREW + side] * 2, color=INK, linewidth=0.8, linestyle="-")
+    thread = _SCREW + 0.11 * (-1.0) ** np.arange(turns.size)
+    ax.plot(turns, thread, color=INK, linewidth=0.8, linestyle="-")
+    _double_arrow(ax, (left + 0.3, 5.9), (right - 0.3, 5.9), 2.2, 1.3)
+
+
+def _draw_lathe_signals(ax: Axes, font: float) -> None:
+    """Both encoders, the computer and the motor, and the wires between them."""
+    size = {"width": 2.3, "height": 1.4}
+    items = [
+        Node("chuck", (_CENTRE[0], _CENTRE[1] - _CHUCK + 0.28)),
+        Block("angle", "spindle\nencoder", (_CENTRE[0], 1.45), fill=FOCUS, **size),
+        Block("computer", "computer", (7.9, 1.45), fill=FOCUS, **size),
+        Block("motor", "servo\nmotor", (12.2, _SCREW), width=2.0, height=1.5),
+        Block("position", "encoder", (14.6, _SCREW), width=2.1, height=1.1, fill=FOCUS),
+    ]
+    wires = [
+        Wire("angle", "chuck"),  # without a head: they turn together
+        Wire("angle", "computer", r"angle $\theta$"),
+        Wire("computer", "motor", "command $y_m$"),
+        Wire("position", "computer", "position $y$", via=0.25),
+    ]
+    by_name = _by_name(items)
+    routes = [_route(wire, by_name) for wire in wires]
+    _paint(ax, items, wires, routes, _labels(items, wires, routes), font)
+    shaft = {"color": INK, "linewidth": 3.0, "linestyle": "-", "solid_capstyle": "butt"}
+    ax.plot([13.2, 13.55], [_SCREW, _SCREW], **shaft)
+
+
+def _draw_radius(ax: Axes) -> None:
+    """Radius of the section over one turn, and where the spindle stands."""
+    left, right, bottom, top = _PLOT
+    angle = np.linspace(0.0, 2 * np.pi, 361)
+    scale = (top - bottom) / (_INRADIUS * (np.sqrt(2) - 1))
+    height = bottom + scale * (_square_radius(angle) - _INRADIUS)
+    for level in (bottom, top):
+        ax.plot([left, right], [level] * 2, color="#8a8a8a", linewidth=0.8, linestyle=(0, (4, 3)))
+    ax.plot(left + (right - left) * angle / (2 * np.pi), height, color=INK, linestyle="-")
+    now = (left + (right - left) * _ANGLE / (2 * np.pi), np.interp(_ANGLE, angle, height))
+    ax.add_patch(Circle(now, 1.4 * _DOT, facecolor=INK, linewidth=0, zorder=4))
 
 
 # --- the layout of loops -------------------------------------------------------------------------
@@ -782,6 +843,36 @@ def _head(ax: Axes, tip: Point, step: Point, color: str, scale: float = 1.0) -> 
     base = np.array(tip) - length * along
     corners = [tip, base + half * across, base - half * across]
     ax.add_patch(Polygon(corners, facecolor=color, linewidth=0, zorder=4))
+
+
+def _double_arrow(
+    ax: Axes, start: Point, end: Point, linewidth: float = 0.8, scale: float = 0.8
+) -> None:
+    """A line with a head at either end, as of a dimension."""
+    reach = np.subtract(end, start)
+    step = reach / np.hypot(*reach)
+    inset = 0.6 * scale * _HEAD[0] * step  # the line stops inside the heads
+    line = np.stack([start + inset, end - inset])
+    ax.plot(*line.T, color=INK, linewidth=linewidth, linestyle="-", solid_capstyle="butt")
+    _head(ax, start, tuple(-step), INK, scale)
+    _head(ax, end, tuple(step), INK, scale)
+
+
+def _clockwise(ax: Axes, centre: Point, radius: float, degrees: tuple[float, float]) -> None:
+    """An arc with a head that shows a sense of rotation, from the larger angle to the smaller."""
+    turn = np.radians(np.linspace(*degrees, 60))
+    arc = np.column_stack([np.cos(turn), np.sin(turn)]) * radius + centre
+    ax.plot(*arc.T, color=INK, linewidth=1.6, linestyle="-")
+    step = np.array([np.sin(turn[-1]), -np.cos(turn[-1])])
+    _head(ax, tuple(arc[-1] + 0.25 * step), tuple(step), INK, scale=1.2)
+
+
+def _annotate(ax: Axes, notes: Sequence[_Note], font: float) -> None:
+    for label, target in notes:
+        _write(ax, label, font)
+        if target is not None:
+            line = {"color": label.color, "linewidth": 0.8, "linestyle": "-"}
+            ax.plot(*zip(*target, strict=True), zorder=4, **line)
 
 
 def _write(ax: Axes, label: _Label, font: float) -> None:
