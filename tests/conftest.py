@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -69,6 +70,10 @@ def make(tmp_path):
             write_notebook(folder / f"{name}.ipynb", cells)
         ignore = shutil.ignore_patterns("_build")
         shutil.copytree(ROOT / "book", tmp_path / "book", ignore=ignore)
+        contents = tmp_path / "book" / "_toc.yml"
+        chapters = re.compile(r"(      - file: notebooks/.*\n)+")
+        text = chapters.sub("      - glob: notebooks/*\n", contents.read_text(encoding="utf-8"))
+        contents.write_text(text, encoding="utf-8")
         return Project(tmp_path, (module.PAPER,))
 
     return make

@@ -27,3 +27,12 @@ def test_every_claim_has_its_anchor(rows, built):
 def test_the_build_leaves_the_book_and_the_ledger_and_nothing_else(built):
     left = sorted(path.name for path in (built / "book" / "_build").iterdir())
     assert left == ["html", "ledger.json"]
+
+
+def test_every_notebook_has_its_place_among_the_chapters(built):
+    """Jupyter Book passes over in silence what the table of contents does not name."""
+    html = built / "book" / "_build" / "html"
+    landing = (html / "index.html").read_text(encoding="utf-8")
+    for notebook in (built / "notebooks").glob("*.ipynb"):
+        assert (html / "notebooks" / f"{notebook.stem}.html").is_file()
+        assert f'href="notebooks/{notebook.stem}.html"' in landing
