@@ -81,9 +81,9 @@ def draw_locus(ax: Axes, loci: ArrayLike, label: str = "") -> Axes:
     return ax
 
 
-def draw_unit_disc(ax: Axes, centre: float = 1.0) -> Axes:
-    """The disc of radius one about `centre`, inside which G H must lie for passes to contract."""
-    ax.add_patch(plt.Circle((centre, 0), 1, facecolor="0.93", edgecolor=GREY, zorder=0))
+def draw_unit_disc(ax: Axes) -> Axes:
+    """The disc of radius one about 1, inside which G H must lie for passes to contract."""
+    ax.add_patch(plt.Circle((1, 0), 1, facecolor="0.93", edgecolor=GREY, zorder=0))
     ax.axhline(0, color="0.8", linewidth=0.8, linestyle="-", zorder=0)
     ax.axvline(0, color="0.8", linewidth=0.8, linestyle="-", zorder=0)
     ax.set_aspect("equal")
