@@ -15,9 +15,9 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon
 from matplotlib.transforms import Bbox
 
-from rcbook import diagrams
+from rcbook import diagrams, plot
 from rcbook.diagrams import Block, Frame, Node, Sum, Wire, draw_block_diagram
-from rcbook.machines import lathe
+from rcbook.machines import face_mill, lathe
 
 F_REF, V_PI = r"$F_\mathrm{ref}$", r"$V_\mathrm{PI}$"
 
@@ -62,7 +62,12 @@ LAYOUTS = {
     "milling": diagrams.draw_milling_setup,
     "lathe": diagrams.draw_lathe_setup,
     "learning": diagrams.draw_learning_loop,
+    "spindle drive": diagrams.draw_spindle_drive,
+    "angle loop": diagrams.draw_angle_loop,
+    "face mill": diagrams.draw_face_mill_setup,
 }
+MACHINES = {"milling", "lathe", "face mill"}
+ROUND = {"learning", "angle loop"}  # whose signals all go round
 
 
 @pytest.fixture(autouse=True)
@@ -186,7 +191,7 @@ def test_arrow_tips_lie_on_the_outlines_they_point_at():
     assert tips == {(-1.0, 0.0), (4.0 - radius, 0.0), (4.0, radius), (0.0, -0.5)}  # none at a dot
 
 
-@pytest.mark.parametrize("name", sorted(LAYOUTS.keys() - {"milling", "lathe"}))
+@pytest.mark.parametrize("name", sorted(LAYOUTS.keys() - MACHINES))
 def test_every_arrow_of_a_layout_ends_on_ink_or_is_the_output(name):
     _, ax = rendered(LAYOUTS[name])
     boxes, circles = outlines(ax)
@@ -199,7 +204,7 @@ def test_every_arrow_of_a_layout_ends_on_ink_or_is_the_output(name):
         )
         on_circle = any(np.isclose(np.hypot(x - cx, y - cy), r) for cx, cy, r in circles)
         loose += not (on_box or on_circle)
-    assert loose == (name != "learning")  # whose signals all go round
+    assert loose == (name not in ROUND)
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
@@ -454,6 +459,187 @@ def test_a_profile_longer_than_the_cutter_is_refused():
         diagrams.draw_waviness(ax, 0.0, 0.19, 5e-3)
 
 
+# --- the spindle drive and its loop --------------------------------------------------------------
+
+
+def test_the_drive_names_every_block_and_signal_once():
+    _, ax = rendered(diagrams.draw_spindle_drive)
+    words = [t.get_text() for t in ax.texts]
+    signals = ("$U_w^*$", "$U_i^*$", "voltage", "$i$", "$w$", r"$T_\mathrm{cut}$", "back EMF")
+    parts = ("50 A", "$K_f$", "$C_{w1}$", "$C_{w2}$", "cut $G_d$")
+    assert [words.count(s) for s in (*signals, *parts)] == [1] * 12
+    assert (words.count("+"), words.count("−")) == (4, 4)
+
+
+def test_the_drive_runs_right_above_and_left_below():
+    _, ax = rendered(diagrams.draw_spindle_drive)
+    at = {t.get_text(): t.get_position() for t in ax.texts}
+    above = [at[s][0] for s in ("$U_w^*$", "velocity control", "50 A", "$U_i^*$", "voltage")]
+    below = [at[s][0] for s in ("armature", "$i$", "$C_{w1}$", "spindle", "$w$")]
+    assert above == sorted(above)
+    assert below == sorted(below, reverse=True)
+
+
+def test_only_the_cut_closes_a_dashed_loop():
+    _, ax = rendered(diagrams.draw_spindle_drive)
+    dashed = [line for line in ax.lines if line.get_linestyle() == "--"]
+    cut = next(t for t in ax.texts if t.get_text() == "cut $G_d$").get_position()
+    assert len(dashed) == 2
+    assert all(np.any(np.isclose(line.get_ydata(), cut[1])) for line in dashed)
+    assert len({line.get_color() for line in dashed}) == 2
+
+
+def test_signs_of_a_sum_fed_from_the_right_and_from_below_stay_apart():
+    _, ax = plt.subplots()
+    wires = [Wire((2.0, 0.0), "sum"), Wire((0.0, -2.0), "sum")]
+    draw_block_diagram(ax, [Sum("sum", signs={"e": "+", "s": "−"})], wires)
+    at = {t.get_text(): t.get_position() for t in ax.texts}
+    assert at["−"][0] < 0 < at["+"][0]
+
+
+def test_an_icon_stands_over_the_text_inside_its_block():
+    _, ax = plt.subplots()
+    draw_block_diagram(ax, [Block("a", "hold", icon=diagrams._HELD, title="title")], [])
+    ((left, low, width, height),) = outlines(ax)[0]
+    icon = ax.lines[0].get_xydata()
+    at = {t.get_text(): t.get_position() for t in ax.texts}
+    assert left < icon[:, 0].min() < icon[:, 0].max() < left + width
+    assert at["hold"][1] < icon[:, 1].min() < icon[:, 1].max() < low + height < at["title"][1]
+
+
+@pytest.mark.parametrize("step", ["9°", "3°"])
+def test_the_loop_holds_and_samples_at_the_same_step(step):
+    _, ax = plt.subplots()
+    diagrams.draw_angle_loop(ax, step)
+    assert [t.get_text() for t in ax.texts if step in t.get_text()] == [
+        f"hold {step}",
+        f"sampled\nevery {step}",
+    ]
+
+
+def test_the_loop_learns_before_it_inverts_and_subtracts_only_the_force():
+    _, ax = rendered(diagrams.draw_angle_loop)
+    at = {t.get_text(): t.get_position()[0] for t in ax.texts}
+    chain = [at[s] for s in ("$F_0$", "$L_n$", r"$F(z^{-1})\,z^{-N}$", "$C(z^{-1})$")]
+    assert chain == sorted(chain)
+    back = [at[s] for s in ("spindle\ndrive", "$w$", "cut", "$F_{ti}$", r"$F_{t\max}$")]
+    assert back == sorted(back, reverse=True)
+    assert [t.get_text() for t in ax.texts].count("−") == 1
+
+
+# --- the face mill -------------------------------------------------------------------------------
+
+INSERTS = np.arange(1, 9)
+
+
+def test_face_mill_names_what_the_model_needs():
+    _, ax = rendered(diagrams.draw_face_mill_setup)
+    words = " ".join(t.get_text().replace("\n", " ") for t in ax.texts)
+    parts = ("spindle axis", "cutter centre", "runout", "workpiece", "entry, 0°", "exit, 180°")
+    signals = (
+        "$w$",
+        "$v_0$",
+        "$F_t$",
+        r"$\theta_i$",
+        r"$\Delta\theta$",
+        r"f_t\,\sin\theta_i+\Delta_i",
+    )
+    assert [part for part in (*parts, *signals) if part not in words] == []
+
+
+def test_inserts_are_numbered_against_the_rotation():
+    """The angle of insert i is that of the cutter minus i - 1 pitches, clockwise."""
+    _, ax = rendered(diagrams.draw_face_mill_setup)
+    at = {t.get_text(): np.subtract(t.get_position(), diagrams._AXIS) for t in ax.texts}
+    x, y = np.array([at[str(i)] for i in INSERTS]).T
+    step = np.diff(np.unwrap(np.arctan2(x, y)))
+    assert np.degrees(step) == pytest.approx([-45.0] * 7, abs=5.0)
+
+
+def test_runout_is_that_of_the_paper_in_proportion_to_the_feed():
+    mill = face_mill.EIGHT_TEETH
+    reach = np.array([diagrams._tooth_reach(i) for i in INSERTS])
+    drawn = (reach - np.roll(reach, 1)) / diagrams._TOOTH_FEED
+    np.testing.assert_allclose(drawn, np.array(mill.runout) / mill.tooth_feed, rtol=1e-3)
+    enlarged = diagrams._TOOTH_FEED / mill.tooth_feed * mill.diameter / 2 / diagrams._REACH
+    assert enlarged == pytest.approx(200, rel=0.05)
+
+
+def test_half_of_the_inserts_touch_the_front_and_none_enters_it():
+    angle = np.array([diagrams._tooth_angle(i) for i in INSERTS]) % (2 * np.pi)
+    reach = np.array([diagrams._tooth_reach(i) for i in INSERTS])
+    cutting = angle < np.pi
+    assert INSERTS[cutting].tolist() == [1, 2, 3, 8]
+    behind = diagrams._front(angle[cutting] - 1e-3)
+    np.testing.assert_allclose(behind, reach[cutting], atol=2e-3)
+    assert np.all(diagrams._front(angle[cutting] + 1e-3) < reach[cutting])  # the chip ahead of it
+
+
+def test_the_drawn_chip_is_about_as_thick_as_the_label_says():
+    """The model takes circles for the paths; the drawing, whose feed is large, the paths."""
+    angle = diagrams._STANDS
+    own, last = (float(diagrams._tooth_path(i, np.array(angle))) for i in (2, 1))
+    runout = diagrams._tooth_reach(2) - diagrams._tooth_reach(1)
+    assert own == pytest.approx(diagrams._tooth_reach(2), abs=1e-6)
+    expected = diagrams._TOOTH_FEED * np.sin(angle) + runout
+    assert own - last == pytest.approx(expected, rel=0.1)
+
+
+# --- teeth and chips -----------------------------------------------------------------------------
+
+
+def test_a_tooth_has_a_bar_of_its_value_and_follows_anticlockwise():
+    _, ax = plt.subplots(subplot_kw={"projection": "polar"})
+    assert plot.draw_teeth(ax, [3.0, 5.0, 4.0], 4.0, "before") is ax
+    bars = ax.patches
+    assert [bar.get_height() for bar in bars] == [3.0, 5.0, 4.0]
+    middle = [bar.get_x() + bar.get_width() / 2 for bar in bars]
+    assert middle == pytest.approx([0, 2 * np.pi / 3, 4 * np.pi / 3])
+    assert (ax.get_theta_offset(), ax.get_theta_direction()) == (np.pi / 2, 1)
+    assert [t.get_text() for t in ax.get_xticklabels()] == ["1", "2", "3"]
+    assert np.all(ax.lines[-1].get_ydata() == 4.0)
+
+
+def test_a_second_set_of_bars_leaves_the_first_to_be_seen():
+    _, ax = plt.subplots(subplot_kw={"projection": "polar"})
+    plot.draw_teeth(ax, np.full(8, 2.0), 1.0, "before")
+    plot.draw_teeth(ax, np.full(8, 1.0), 1.0, "after", outlined=True)
+    before, after = ax.patches[0], ax.patches[8]
+    assert before.get_fill()
+    assert not after.get_fill()
+    assert after.get_width() < before.get_width()
+    labels = ax.get_legend_handles_labels()[1]
+    assert sorted(labels) == ["after", "before", "reference, 1"]
+    assert ax.get_ylim()[0] == 0.0
+
+
+def chips(ax):
+    return [p.get_xy() for p in ax.patches if isinstance(p, Polygon)]
+
+
+def test_a_chip_is_as_long_as_its_thickness_magnified_and_where_its_tooth_is():
+    _, ax = plt.subplots()
+    angle, thickness = np.radians([90.0, 45.0, 0.0, -45.0]), np.array([60e-6, 30e-6, 0.0, 0.0])
+    assert plot.draw_cutter_chips(ax, angle, thickness, 0.05, 200) is ax
+    assert len(chips(ax)) == 2
+    for xy, at, chip in zip(chips(ax), angle, thickness, strict=False):
+        distance = np.hypot(*xy.T)
+        assert np.ptp(distance) == pytest.approx(200 * chip)
+        assert distance.min() == pytest.approx(0.05)
+        assert np.arctan2(*xy[:-1].mean(axis=0)) == pytest.approx(at)  # clockwise from the top
+    assert [t.get_text() for t in ax.texts] == ["200×", "1", "2", "3", "4"]
+
+
+def test_cutters_with_the_same_feed_share_their_scale():
+    _, axes = plt.subplots(1, 2)
+    for ax, chip in zip(axes, (20e-6, 70e-6), strict=True):
+        plot.draw_cutter_chips(ax, [np.pi / 2], [chip], 0.05, 200, feed=60e-6, numbered=False)
+        assert [t.get_text() for t in ax.texts] == ["200×"]
+        assert ax.lines[0].get_xdata().max() == pytest.approx(0.05 + 200 * 60e-6)
+    assert axes[0].get_xlim() == axes[1].get_xlim()
+    assert axes[0].get_ylim() == axes[1].get_ylim()
+
+
 # --- the style -----------------------------------------------------------------------------------
 
 
@@ -475,7 +661,7 @@ def test_fonts_are_those_that_ship_with_matplotlib():
     assert plt.rcParams["mathtext.fontset"] == "dejavusans"
 
 
-@pytest.mark.parametrize("draw", [diagrams.draw_milling_setup, diagrams.draw_lathe_setup])
+@pytest.mark.parametrize("draw", [LAYOUTS[name] for name in sorted(MACHINES)])
 def test_the_same_drawing_gives_the_same_file(tmp_path, draw):
     for name in ("first.svg", "second.svg"):
         figure, _ = rendered.__wrapped__(draw)

@@ -36,6 +36,7 @@ _DOT = 0.07  # radius of a pick-off
 _HEAD = (0.24, 0.09)  # length and half width of an arrow head
 _GAP = 0.9  # shortest wire between two parts of a row
 _BASELINE = 0.17  # of a label above its wire
+_ICON = (0.5, 0.22)  # half width and half height
 _COMPASS = {(1, 0): "e", (-1, 0): "w", (0, 1): "n", (0, -1): "s"}
 _SIGN_SPOTS = {
     "w": (-_RADIUS - 0.17, -0.25),
@@ -47,7 +48,10 @@ _SIGN_SPOTS = {
 
 @dataclass(frozen=True)
 class Block:
-    """A box with text, centred at `xy`; a width or height left out is what the text needs."""
+    """A box with text, centred at `xy`; a width or height left out is what the text needs.
+
+    A `title` stands above the box.  An `icon` is a curve over the text, its points within -1 to 1.
+    """
 
     name: str
     text: str
@@ -55,6 +59,8 @@ class Block:
     width: float | None = None
     height: float | None = None
     fill: str = PAPER
+    title: str = ""
+    icon: Sequence[Point] = ()
 
 
 @dataclass(frozen=True)
@@ -76,12 +82,16 @@ class Node:
 
 @dataclass(frozen=True)
 class Frame:
-    """A dashed outline centred at `xy` around the parts that belong together."""
+    """A dashed outline centred at `xy` around the parts that belong together.
+
+    Its `title` is in the lower left corner.
+    """
 
     name: str
     xy: Point
     width: float
     height: float
+    title: str = ""
 
 
 @dataclass(frozen=True)
@@ -97,6 +107,7 @@ class Wire:
     label: str = ""
     via: float | None = None
     color: str = INK
+    dashed: bool = False
 
 
 Item = Block | Sum | Node | Frame
@@ -289,6 +300,110 @@ def draw_repetitive_generator(
     return draw_block_diagram(ax, items, wires)
 
 
+_LIMITED = ((-1.0, -1.0), (-0.4, -1.0), (0.4, 1.0), (1.0, 1.0))
+_HELD = ((-1, -1), (-0.5, -1), (-0.5, 0.2), (0, 0.2), (0, 1), (0.5, 1), (0.5, -0.2), (1, -0.2))
+
+
+def draw_spindle_drive(ax: Axes, limit: str = "50 A") -> Axes:
+    """Draw the cascade of a spindle drive, from speed command to speed, and the cut as its load.
+
+    The controllers are above, from left to right; motor and spindle are below, from right to left.
+    `limit` is the text of the current limit.  Made for a figure of about 7.5 by 4 inches.
+    """
+    proportional = r"$K_{pv}+\dfrac{K_{iv}}{s}$"
+    current = r"$K_u\left(K_{pi}+\dfrac{K_{ii}}{s}\right)$"
+    size = {"height": 1.4}
+    motor = {"height": 1.4, "fill": PLANT}
+    items = [
+        Sum("speed error", (1.9, 0.0)),
+        Block("velocity", proportional, (4.4, 0.0), title="velocity control", **size),
+        Block("limit", limit, (7.4, 0.0), title="current limit", icon=_LIMITED, **size),
+        Sum("current error", (9.8, 0.0)),
+        Block("current", current, (12.3, 0.0), title="current control", **size),
+        Sum("voltage", (15.6, -3.5), {"n": "+", "s": "−"}),
+        Block("armature", r"$\dfrac{1}{L_a s+R_a}$", (12.6, -3.5), title="armature", **motor),
+        Node("i", (9.8, -3.5)),
+        Block("sensor", "$K_f$", (9.8, -1.75)),
+        Block("torque", "$C_{w1}$", (8.4, -3.5), fill=PLANT),
+        Sum("torque error", (6.6, -3.5), {"e": "+", "s": "−"}),
+        Block("inertia", r"$\dfrac{1}{Js+B}$", (4.7, -3.5), title="spindle", **motor),
+        Node("cut off", (3.0, -3.5)),
+        Node("w", (1.9, -3.5)),
+        Block("tacho", r"$\dfrac{C_{wt}}{T_g s+1}$", (1.9, -1.75), height=1.4),
+        Block("cut", "cut $G_d$", (4.7, -5.1), fill=FOCUS),
+        Block("emf", "$C_{w2}$", (8.4, -6.2), fill=PLANT),
+    ]
+    wires = [
+        Wire((0.0, 0.0), "speed error", "$U_w^*$"),
+        Wire("speed error", "velocity"),
+        Wire("velocity", "limit"),
+        Wire("limit", "current error", "$U_i^*$"),
+        Wire("current error", "current"),
+        Wire("current", "voltage", "voltage"),
+        Wire("voltage", "armature"),
+        Wire("armature", "i", "$i$"),
+        Wire("i", "sensor"),
+        Wire("sensor", "current error"),
+        Wire("i", "torque"),
+        Wire("torque", "torque error"),
+        Wire("torque error", "inertia"),
+        Wire("inertia", "cut off"),
+        Wire("cut off", "w"),
+        Wire("w", (0.0, -3.5), "$w$"),
+        Wire("w", "tacho"),
+        Wire("tacho", "speed error"),
+        Wire("cut off", "cut", via=-5.1, dashed=True),
+        Wire("cut", "torque error", r"$T_\mathrm{cut}$", color=DISTURBED, dashed=True),
+        Wire("w", "emf", via=-6.2),
+        Wire("emf", "voltage", "back EMF"),
+    ]
+    return draw_block_diagram(ax, items, wires)
+
+
+def draw_angle_loop(ax: Axes, step: str = "9°") -> Axes:
+    """Draw the repetitive loop that samples every `step` of the cutter's turn.
+
+    Above is the controller `L_n F z^-N C / (1 - F z^-N)`, from left to right; below, from right to
+    left, is what turns with the cutter.  Made for a figure of about 7.5 by 3.3 inches.
+    """
+    size = {"width": 2.0, "height": 1.5}
+    items = [
+        Sum("error", (1.9, 0.0)),
+        Block("gain", "$L_n$", (3.7, 0.0), fill=FOCUS),
+        Sum("learned", (5.4, 0.0), {"w": "+", "n": "+"}),
+        Block("memory", r"$F(z^{-1})\,z^{-N}$", (7.9, 0.0), fill=FOCUS, title="memory of a turn"),
+        Node("tap", (9.95, 0.0)),
+        Block("inverse", "$C(z^{-1})$", (11.5, 0.0), fill=FOCUS),
+        Sum("command", (13.6, 0.0), {"w": "+", "n": "+"}),
+        Block("hold", f"hold {step}", (15.6, -3.4), icon=_HELD, **size),
+        Block("drive", "spindle\ndrive", (12.25, -3.4), fill=PLANT, **size),
+        Block("cut", "cut", (9.0, -3.4), fill=PLANT, **size),
+        Block("largest", "max over\nteeth", (5.75, -3.4), **size),
+        Block("sampler", f"sampled\nevery {step}", (1.9, -3.4), **size),
+        Frame("angle", (9.0, -3.55), 9.0, 3.2, title=r"in the cutter angle $\theta$"),
+    ]
+    wires = [
+        Wire((0.0, 0.0), "error", "$F_0$"),
+        Wire("error", "gain"),
+        Wire("gain", "learned"),
+        Wire("learned", "memory"),
+        Wire("memory", "tap"),
+        Wire("tap", "learned", via=1.55),
+        Wire("tap", "inverse"),
+        Wire("inverse", "command"),
+        Wire((13.6, 1.2), "command", "nominal $U_0$"),
+        Wire("command", "hold", "$U_w^*(k)$"),
+        Wire("hold", "drive"),
+        Wire("drive", "cut", "$w$"),
+        Wire("cut", "drive", r"$T_\mathrm{cut}$", via=-4.8, dashed=True),
+        Wire((9.0, -1.75), "cut", r"runout $\Delta_i$", color=DISTURBED),
+        Wire("cut", "largest", "$F_{ti}$"),
+        Wire("largest", "sampler", r"$F_{t\max}$"),
+        Wire("sampler", "error"),
+    ]
+    return draw_block_diagram(ax, items, wires)
+
+
 def draw_waviness(
     ax: Axes,
     eccentricity: float,
@@ -406,18 +521,24 @@ def _cut_edge(x: np.ndarray) -> np.ndarray:
 
 def _draw_cutter(ax: Axes) -> None:
     """Cutter, both axes, the circle that its outermost tooth sweeps, and the sense of rotation."""
-    (x, y), axis = _SPINDLE, _cutter_axis()
+    axis = _cutter_axis()
     outline = _flutes() + axis
     ax.add_patch(Polygon(outline, facecolor=STEEL, edgecolor=INK, linewidth=_LINE, zorder=2))
+    _mark_offset(ax, _SPINDLE, axis, _CUTTER + _OFFSET)
+    _clockwise(ax, _SPINDLE, 2.0, (125.0, 62.0))  # as seen from the spindle
+
+
+def _mark_offset(ax: Axes, spindle: Point, cutter: Point, radius: float) -> None:
+    """A cross at the spindle axis with a dashed circle about it, and a dot at the cutter's axis."""
+    x, y = spindle
     swept = {"fill": False, "linestyle": (0, (5, 3)), "linewidth": 0.8, "edgecolor": INK}
-    ax.add_patch(Circle(_SPINDLE, _CUTTER + _OFFSET, zorder=3, **swept))
+    ax.add_patch(Circle(spindle, radius, zorder=2.5, **swept))
     offset = {"color": DISTURBED, "linewidth": 2.4, "linestyle": "-"}
-    ax.plot(*zip(_SPINDLE, axis, strict=True), zorder=4, **offset)
-    ax.add_patch(Circle(axis, 0.08, facecolor=DISTURBED, linewidth=0, zorder=5))
+    ax.plot(*zip(spindle, cutter, strict=True), zorder=4, **offset)
+    ax.add_patch(Circle(cutter, 0.08, facecolor=DISTURBED, linewidth=0, zorder=5))
     for dx, dy in ((0.17, 0.0), (0.0, 0.17)):
         cross = {"color": INK, "linewidth": 1.5, "linestyle": "-"}
         ax.plot([x - dx, x + dx], [y - dy, y + dy], zorder=5, **cross)
-    _clockwise(ax, _SPINDLE, 2.0, (125.0, 62.0))  # as seen from the spindle
 
 
 def _flutes() -> np.ndarray:
@@ -448,6 +569,169 @@ def _draw_signal_path(ax: Axes, font: float) -> None:
     routes = [_route(wire, by_name) for wire in wires]
     routes[0] = [(8.35, 2.3), (10.3, 2.3), (10.3, 7.2), (x - 1.6, 7.2)]
     _paint(ax, items, wires, routes, _labels(items, wires, routes), font)
+
+
+# --- the face mill -------------------------------------------------------------------------------
+
+_AXIS = (5.3, 4.2)  # of the spindle
+_TEETH, _PITCH = 8, np.pi / 4
+_REACH = 2.6  # radius of the cutter, which stands for 50 mm
+_TOOTH_FEED = 0.6  # far larger than in truth
+_OUT = _TOOTH_FEED / 3  # of the cutter's centre from the axis; in true proportion to the feed
+_LONGEST = 2  # the insert that the offset points to
+_STANDS = np.radians(80.0)  # the angle at which this insert stands
+_BLANK = (0.5, 11.9)  # left and right end of the workpiece
+_MEASURED = np.radians(106.0)  # where the chip's thickness is shown
+_CHIP = "#7fb4dd"  # fill of this chip, darker than FOCUS
+_INSERT = ((0.0, 0.0), (-0.08, -0.62), (-0.5, -0.58), (-0.42, -0.14))  # along, outward
+
+
+def draw_face_mill_setup(ax: Axes) -> Axes:
+    """Draw face milling seen along the spindle axis: inserts, what they cut, runout and force.
+
+    A tooth enters the workpiece at the top, at 0 degrees, and leaves at the bottom.  Made for a
+    figure of about 7.5 by 3.9 inches; feed and runout are exaggerated, alike and about 200 times.
+    """
+    font = 1.08 * _fit(ax, (0.0, 0.0, 16.0, 8.4))
+    _draw_blank(ax)
+    _draw_face_mill(ax, font)
+    _draw_mill_angles(ax)
+    _annotate(ax, _face_mill_notes(), font)
+    return ax
+
+
+def _face_mill_notes() -> list[_Note]:
+    """The words on the picture, and the line from a word to what it names."""
+    x = _AXIS[0]
+    centre = _Label(7.0, 0.62, "cutter centre,\noff by the runout", "left", color=DISTURBED)
+    chip = _Label(12.35, 3.9, "chip thickness\n" + r"$f_t\,\sin\theta_i+\Delta_i$", "left")
+    return [
+        (_Label(x, 7.95, "entry, 0°"), None),
+        (_Label(x, 0.62, "exit, 180°"), None),
+        (_Label(0.8, 2.05, "spindle axis", "left"), ((2.95, 2.3), _AXIS)),
+        (centre, ((7.4, 1.15), tuple(_seen(_OUT, _STANDS)))),
+        (_Label(3.0, 7.35, "speed $w$", "right"), None),
+        (_Label(*_seen(3.75, _tooth_angle(5) - _PITCH / 2), r"$\Delta\theta$"), None),
+        (_Label(*_seen(0.8, 0.5 * _STANDS), r"$\theta_i$"), None),
+        (_Label(*_seen(_REACH + 0.8, 1.08), "$F_t$"), None),
+        (_Label(10.2, 6.2, "workpiece"), None),
+        (chip, ((12.2, 3.9), tuple(_chip_ends()[1]))),
+        (_Label(12.35, 2.3, "feed $v_0$", "left"), None),
+    ]
+
+
+def _tooth_angle(number: int) -> float:
+    """Where an insert stands now, clockwise from the top."""
+    return _STANDS - (number - _LONGEST) * _PITCH
+
+
+def _tooth_reach(number: int) -> float:
+    """Distance of an insert's edge from the spindle axis."""
+    return _REACH + _OUT * np.cos((number - _LONGEST) * _PITCH)
+
+
+def _seen(radius: np.ndarray | float, angle: np.ndarray | float) -> np.ndarray:
+    """Points about the spindle axis, at an angle clockwise from the top."""
+    angle = np.asarray(angle)
+    offset = np.stack([np.sin(angle), np.cos(angle)], axis=-1)
+    return np.asarray(radius)[..., None] * offset + _AXIS
+
+
+def _tooth_path(number: int, direction: np.ndarray, until: float = np.inf) -> np.ndarray:
+    """How far the path of an insert is from the spindle axis in directions clockwise from the top.
+
+    Numbers below one are inserts of the turn before.  The path runs from 0 to 180 degrees and on
+    straight out of the workpiece, or ends where the insert stands at the angle `until`.
+    """
+    angle = np.linspace(0.0, np.clip(until, 0.0, np.pi), 1200)
+    fed = _TOOTH_FEED * (angle - _tooth_angle(number)) / _PITCH
+    x, y = _tooth_reach(number) * np.array([np.sin(angle), np.cos(angle)]) + [fed, 0 * fed]
+    beyond = np.linspace(0.05, 6.0, 120)
+    x, y = np.append(x[0] + 0 * beyond, x), np.append(y[0] + beyond[::-1], y)
+    if ends := until >= np.pi:
+        x, y = np.append(x, x[-1] + 0 * beyond), np.append(y, y[-1] - beyond)
+    radius = np.hypot(x, y)
+    last = radius[-1] if ends else -np.inf
+    return np.interp(direction, np.unwrap(np.arctan2(x, y)), radius, right=last)
+
+
+def _front(direction: np.ndarray) -> np.ndarray:
+    """How far the workpiece is cut in each direction: to the outermost of the paths so far."""
+    latest = (-1, 0, 1, 2, 3)  # one that has just left, four in the cut
+    return np.max([_tooth_path(n, direction, _tooth_angle(n)) for n in latest], axis=0)
+
+
+def _chip_ends() -> np.ndarray:
+    """Inner and outer end of the measured chip, on a line from the spindle axis."""
+    radius = [_tooth_path(n, np.array(_MEASURED)) for n in (_LONGEST - 1, _LONGEST)]
+    return _seen(np.array(radius), np.full(2, _MEASURED))
+
+
+def _draw_blank(ax: Axes) -> None:
+    """Workpiece with its cut front, the layers that the inserts will cut, and the feed."""
+    (left, right), (_, y) = _BLANK, _AXIS
+    ink = {"edgecolor": INK, "linewidth": _LINE}
+    whole = Rectangle((left, y - _REACH), right - left, 2 * _REACH, facecolor=PAPER, **ink)
+    ax.add_patch(whole)
+    half_turn = np.linspace(0.0, np.pi, 1500)
+    front = _seen(_front(half_turn), half_turn)
+    rest = Polygon([*front, (right, y - 4.0), (right, y + 4.0)], facecolor=PLANT, **ink)
+    ax.add_patch(rest).set_clip_path(whole)
+    for number in (0, 1, 3, 2):
+        ahead = np.linspace(_tooth_angle(number), np.pi, 400)
+        inner, outer = (_seen(_tooth_path(n, ahead), ahead) for n in (number - 1, number))
+        fill = _CHIP if number == _LONGEST else FOCUS
+        layer = Polygon([*inner, *outer[::-1]], facecolor=fill, edgecolor=INK, linewidth=0.8)
+        ax.add_patch(layer).set_clip_path(whole)
+    ax.add_patch(Rectangle(whole.get_xy(), right - left, 2 * _REACH, fill=False, **ink))
+    ax.plot([12.6, 13.9], [1.8, 1.8], color=INK, linewidth=2.2, linestyle="-")
+    _head(ax, (12.3, 1.8), (-1, 0), INK, scale=1.5)
+
+
+def _draw_face_mill(ax: Axes, font: float) -> None:
+    """Body and numbered inserts, the axis and the cutter's centre, and the sense of rotation."""
+    ink = {"edgecolor": INK, "linewidth": _LINE}
+    ax.add_patch(Polygon(_face_mill_body(), facecolor=STEEL, zorder=2, **ink))
+    for number in range(1, _TEETH + 1):
+        angle, reach = _tooth_angle(number), _tooth_reach(number)
+        along = np.array([np.cos(angle), -np.sin(angle)])  # the way it moves
+        outward = np.array([np.sin(angle), np.cos(angle)])
+        wedge = [_AXIS + (reach + r) * outward + t * along for t, r in _INSERT]
+        fill = DISTURBED if number == _LONGEST else "#6e6e6e"
+        ax.add_patch(Polygon(wedge, facecolor=fill, zorder=3, **ink))
+        label = _AXIS + (reach - 0.95) * outward - 0.25 * along
+        _write(ax, _Label(*label, str(number)), font)
+    _mark_offset(ax, _AXIS, tuple(_seen(_OUT, _STANDS)), _REACH)
+    _clockwise(ax, _AXIS, 3.2, (138.0, 104.0))
+
+
+def _face_mill_body() -> np.ndarray:
+    """Outline of the body about the cutter's centre, with a pocket ahead of every insert."""
+    angle, reach = np.radians([-2, 0, 6, 14, 22, 43]), [2.3, 1.85, 1.8, 1.95, 2.3, 2.3]
+    fine = np.linspace(angle[0], angle[-1], 60)
+    ring = np.tile(PchipInterpolator(angle, reach)(fine), _TEETH)
+    turn = np.concatenate([fine + _tooth_angle(n) for n in range(_TEETH, 0, -1)])
+    return _seen(ring, turn) + _seen(_OUT, _STANDS) - _AXIS
+
+
+def _draw_mill_angles(ax: Axes) -> None:
+    """Where a tooth enters and leaves, an insert's angle, chip and force, and the pitch."""
+    (x, y), tip = _AXIS, _seen(_tooth_reach(_LONGEST), _STANDS)
+    thin = {"color": INK, "linewidth": 0.8, "linestyle": "-", "zorder": 3.5}
+    for line in ([_AXIS, (x, y + 3.4)], [(x, y - _REACH), (x, y - 3.2)], [_AXIS, tip]):
+        ax.plot(*zip(*line, strict=True), **thin)
+    _clockwise(ax, _AXIS, 1.2, (90.0, 102.0 - np.degrees(_STANDS)))  # its head takes 12 degrees
+    _double_arrow(ax, *_chip_ends())
+    ends = _tooth_angle(5), _tooth_angle(6)
+    ax.plot(*_seen(3.3, np.linspace(*ends, 60)).T, **thin)
+    for angle, sense in zip(ends, (1, -1), strict=True):
+        ax.plot(*_seen(np.array([2.5, 3.55]), np.full(2, angle)).T, **thin)
+        step = sense * np.array([np.cos(angle), -np.sin(angle)])
+        _head(ax, tuple(_seen(3.3, angle)), tuple(step), INK, scale=0.8)
+    push = np.array([-np.cos(_STANDS), np.sin(_STANDS)])  # against the way the insert moves
+    arrow = np.stack([tip, tip + 1.3 * push])
+    ax.plot(*arrow.T, color=INK, linewidth=2.2, linestyle="-", zorder=4)
+    _head(ax, tuple(tip + 1.6 * push), tuple(push), INK, scale=1.5)
 
 
 # --- the lathe -----------------------------------------------------------------------------------
@@ -683,9 +967,15 @@ def _half_size(item: Item) -> Point:
     if isinstance(item, Node):
         return 0.0, 0.0
     width, height = _text_size(item.text) if isinstance(item, Block) else (0.0, 0.0)
+    height += 2 * _icon_lift(item)
     width = max(1.1, width + 0.5) if item.width is None else item.width
     height = max(1.0, height + 0.45) if item.height is None else item.height
     return width / 2, height / 2
+
+
+def _icon_lift(item: Item) -> float:
+    """How far above the middle of a block its icon is; its text is as far below."""
+    return _ICON[1] + 0.1 if isinstance(item, Block) and item.icon else 0.0
 
 
 def _route(wire: Wire, by_name: Mapping[str, Item]) -> list[Point]:
@@ -727,11 +1017,20 @@ def _labels(
     items: Sequence[Item], wires: Sequence[Wire], routes: Sequence[list[Point]]
 ) -> list[_Label]:
     """Every text of a diagram and its place."""
-    labels = [_Label(*item.xy, item.text) for item in items if isinstance(item, Block)]
+    labels = []
     for item in items:
+        if isinstance(item, Block):
+            labels.append(_Label(item.xy[0], item.xy[1] - _icon_lift(item), item.text))
+        if isinstance(item, Block | Frame) and item.title:
+            (x, y), (dx, dy) = item.xy, _half_size(item)
+            inside = (x - dx + 0.3, y - dy + 0.25, item.title, "left", "baseline")
+            above = (x, y + dy + _BASELINE, item.title, "center", "baseline")
+            labels.append(_Label(*(inside if isinstance(item, Frame) else above)))
         if isinstance(item, Sum):
             for side, sign in item.signs.items():
                 dx, dy = _SIGN_SPOTS[side]
+                if side == "s" and "e" in item.signs:
+                    dx = -dx
                 labels.append(_Label(item.xy[0] + dx, item.xy[1] + dy, sign))
     labels += [_wire_label(w, route) for w, route in zip(wires, routes, strict=True) if w.label]
     return labels
@@ -801,9 +1100,12 @@ def _paint(
 ) -> None:
     for wire, route in zip(wires, routes, strict=True):
         into_dot = any(isinstance(i, Node) and i.name == wire.end for i in items)
-        _draw_wire(ax, route, wire.color, arrow=not into_dot)
+        _draw_wire(ax, route, wire.color, arrow=not into_dot, dashed=wire.dashed)
     for item in items:
         ax.add_patch(_shape(item))
+        if lift := _icon_lift(item):
+            icon = item.xy + np.multiply(item.icon, _ICON) + (0.0, lift)
+            ax.plot(*icon.T, color=INK, linewidth=_LINE, linestyle="-", zorder=4)
     for label in labels:
         _write(ax, label, font)
 
@@ -824,7 +1126,9 @@ def _shape(item: Item) -> Patch:
     return FancyBboxPatch(corner, 2 * dx, 2 * dy, pad, facecolor=item.fill, zorder=3, **ink)
 
 
-def _draw_wire(ax: Axes, route: Sequence[Point], color: str, arrow: bool) -> None:
+def _draw_wire(
+    ax: Axes, route: Sequence[Point], color: str, arrow: bool, dashed: bool = False
+) -> None:
     """A polyline whose arrow head ends exactly on the outline it points at."""
     x, y = np.array(route, dtype=float).T
     if arrow:
@@ -832,7 +1136,8 @@ def _draw_wire(ax: Axes, route: Sequence[Point], color: str, arrow: bool) -> Non
         _head(ax, route[-1], step, color)
         x[-1] -= 0.6 * _HEAD[0] * step[0]
         y[-1] -= 0.6 * _HEAD[0] * step[1]
-    style = {"linewidth": _LINE, "linestyle": "-", "marker": "", "solid_joinstyle": "miter"}
+    dashes = (0, (4, 2)) if dashed else "-"
+    style = {"linewidth": _LINE, "linestyle": dashes, "marker": "", "solid_joinstyle": "miter"}
     ax.plot(x, y, color=color, zorder=2, solid_capstyle="butt", **style)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import resources
 
 import matplotlib.pyplot as plt
@@ -9,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
+from rcbook.machines import face_mill
 from rcbook.repetitive import Run
 from rcbook.zdomain import Plant
 
@@ -50,6 +52,21 @@ def mark_revolutions(ax: Axes, frequency: float) -> Axes:
     top = ax.secondary_xaxis("top", functions=(lambda t: t * frequency, lambda m: m / frequency))
     top.set_xlabel("revolutions")
     return ax
+
+
+def draw_cut(axes: Sequence[Axes], run: face_mill.Run, label: str | None = None, **line) -> None:
+    """Largest tooth force, torque, current and speed of a milling run on four axes, one for each.
+
+    Revolutions are counted from 0; a thin line marks where the controller sets in.
+    """
+    quantities = ((run.force, "force (N)"), (run.torque, "torque (N m)"))
+    quantities += ((run.current, "current (A)"), (run.speed, "speed (rad/s)"))
+    for ax, (values, name) in zip(axes, quantities, strict=True):
+        ax.plot(run.turns, values, label=label, **{"linewidth": 0.9, "linestyle": "-", **line})
+        ax.axvline(run.experiment.controlled - 1, color=GREY, linewidth=0.8, linestyle=":")
+        ax.set_ylabel(name)
+        ax.margins(x=0)
+    axes[-1].set_xlabel("revolutions of the cutter")
 
 
 def draw_unit_circle(ax: Axes) -> Axes:
@@ -103,3 +120,78 @@ def draw_section(
     ax.grid(False)
     ax.spines["polar"].set_visible(False)
     return ax
+
+
+def draw_teeth(
+    ax: Axes, values: ArrayLike, reference: float, label: str = "", outlined: bool = False
+) -> Axes:
+    """One bar per tooth, from the hub of a cutter (`ax` is polar), and the reference dashed.
+
+    Tooth 1 is at the top and the others follow anticlockwise, as they pass on a cutter that turns
+    clockwise.  Bars are broad and grey, or narrow and `outlined` to go over the broad ones.
+    """
+    values = np.asarray(values, dtype=float)
+    angle = 2 * np.pi * np.arange(values.size) / values.size
+    broad = {"color": "0.80", "width": 0.84, "zorder": 2}
+    narrow = {"fill": False, "edgecolor": "black", "linewidth": 1.4, "width": 0.5, "zorder": 3}
+    style = narrow if outlined else broad
+    ax.bar(angle, values, label=label or None, **{**style, "width": style["width"] * angle[1]})
+    turn = np.linspace(0, 2 * np.pi, 361)
+    ax.plot(turn, 0 * turn, color="0.3", linewidth=1.0, linestyle="-", zorder=3)
+    circle = {"color": "C1", "linewidth": 1.3, "linestyle": (0, (4, 2)), "zorder": 4}
+    named = None if outlined else f"reference, {reference:.3g}"
+    ax.plot(turn, 0 * turn + reference, label=named, **circle)
+    ax.set_theta_zero_location("N")
+    ax.set_xticks(angle, [f"{i + 1}" for i in range(values.size)])
+    ax.set_yticks([])
+    ax.set_rmin(0)
+    ax.set_rorigin(-0.4 * reference)  # a hub, so that the bars do not crowd in the middle
+    ax.xaxis.grid(False)
+    ax.spines["polar"].set_visible(False)
+    return ax
+
+
+def draw_cutter_chips(
+    ax: Axes,
+    angle: ArrayLike,
+    thickness: ArrayLike,
+    radius: float,
+    magnified: float,
+    feed: float | None = None,
+    numbered: bool = True,
+) -> Axes:
+    """The chips of all teeth now, as slivers outside of a cutter that turns clockwise; all in m.
+
+    Their thickness is `magnified`, which the cutter says in its middle.  Angles in rad run
+    clockwise from the top, where a tooth enters.  A dashed line shows `feed` times the sine of the
+    angle, what the feed per tooth would give without runout; with it, drawings share their scale.
+    """
+    angle, thickness = np.asarray(angle, dtype=float), np.asarray(thickness, dtype=float)
+    cutting = np.linspace(0, np.pi, 181)
+    if feed is not None:
+        nominal = radius + magnified * feed * np.sin(cutting)
+        style = {"linewidth": 1.0, "linestyle": (0, (4, 2))}
+        ax.plot(*_clock(nominal, cutting), color="0.35", **style)
+        tall = radius + 0.8 * magnified * feed
+        ax.set(xlim=(-1.05 * radius, radius + 1.35 * magnified * feed), ylim=(-tall, tall))
+    words = {"ha": "center", "va": "center", "fontsize": "small", "zorder": 5}
+    ax.text(0, 0, f"{magnified:g}×", **words)
+    half = min(0.13, 0.35 * np.pi / angle.size)
+    for i, (at, chip) in enumerate(zip(angle, thickness, strict=True)):
+        across = np.linspace(at - half, at + half, 9)
+        sliver = [*_clock(radius, across).T, *_clock(radius + magnified * chip, across[::-1]).T]
+        if chip > 0:
+            ax.add_patch(plt.Polygon(sliver, facecolor="C0", edgecolor="black", zorder=2))
+        ax.plot(*_clock(np.array([0.86, 1.0]) * radius, at), color="black", linestyle="-", zorder=4)
+        if numbered:
+            ax.text(*_clock(0.68 * radius, at), f"{i + 1}", **words)
+    body = {"facecolor": "0.88", "edgecolor": "0.3", "linewidth": 1.0, "zorder": 3}
+    ax.add_patch(plt.Circle((0, 0), radius, **body))
+    ax.set_aspect("equal")
+    ax.set_axis_off()
+    return ax
+
+
+def _clock(radius: ArrayLike, angle: ArrayLike) -> np.ndarray:
+    """Points at angles clockwise from the top, coordinates on the first axis."""
+    return np.stack(np.broadcast_arrays(radius * np.sin(angle), radius * np.cos(angle)))

@@ -13,7 +13,7 @@ plant input, y output.  In a *cascade* u is what the repetitive controller makes
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -246,7 +246,10 @@ def stable_gains(loop: Loop, highest: float = 100.0) -> list[tuple[float, float]
     d, n = multiply(path.a, dg), multiply(path.numerator, ng)
     length = max(d.size, n.size)
     d, n = (np.pad(p, (0, length - p.size)) for p in (d, n))
-    crossings = np.roots(np.convolve(d, n[::-1]) - np.convolve(n, d[::-1]))
+    crossing = np.convolve(d, n[::-1]) - np.convolve(n, d[::-1])
+    # On the unit circle coefficients below rounding do not count, as leading ones they mislead.
+    crossing[np.abs(crossing) < 1e-18 * np.abs(crossing).max()] = 0
+    crossings = np.roots(crossing)
     z = crossings[np.abs(np.abs(crossings) - 1) < 1e-4]
     z = np.append(z / np.abs(z), [1.0, -1.0])
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -313,6 +316,50 @@ def transfer(loop: Loop, source: str, output: str) -> tuple[np.ndarray, np.ndarr
     measured = -numerators[source, "output"]
     direct = {"reference": delta, "disturbance": np.zeros(1), "noise": -delta}[source]
     return add(direct, measured), delta
+
+
+def unstable_roots(
+    repetitive: RepetitiveController, plant: Callable[[np.ndarray], np.ndarray]
+) -> int:
+    """Closed-loop roots outside the unit circle, counted from the plant's frequency response.
+
+    `plant` gives the response, model or measurement, of a real and stable plant at an array of
+    points z of the upper half of the circle.  The roots are zeros of 1 - q z^-N (1 - k_r C G):
+    its turns round the origin are counted, on a grid that is refined until no step turns by more
+    than 1 rad.
+    Raises ValueError when a root lies on the circle, or too close to tell.
+    """
+
+    def around(angle: np.ndarray) -> np.ndarray:
+        z = np.exp(1j * angle)
+        return 1 - regeneration(repetitive, plant(z), z) * z ** float(-repetitive.period)
+
+    n = 16 * repetitive.period
+    angle = np.pi * (np.arange(n) + 0.5) / n
+    value = around(angle)
+    for _ in range(30):
+        mirrored = np.concatenate([value[:1].conj(), value, value[-1:].conj()])
+        turned = np.angle(mirrored[1:] / mirrored[:-1])
+        coarse = np.flatnonzero(np.abs(turned) > 1)
+        if not coarse.size:
+            return -round((2 * turned[1:-1].sum() + turned[0] + turned[-1]) / (2 * np.pi))
+        edges = np.concatenate([[0.0], angle, [np.pi]])
+        between = (edges[coarse] + edges[coarse + 1]) / 2
+        angle, value = np.append(angle, between), np.append(value, around(between))
+        order = np.argsort(angle)
+        angle, value = angle[order], value[order]
+    raise ValueError(
+        f"a root lies on the unit circle near an angle of {between[0]:.9g} rad, or too close to it"
+    )
+
+
+def regeneration(repetitive: RepetitiveController, response: ArrayLike, z: ArrayLike) -> np.ndarray:
+    """Factor q (1 - k_r C G) from one period to the next at points z, for a plant response G.
+
+    Below one in magnitude everywhere it makes the loop stable whatever the period.
+    """
+    compensated = zdomain.response(repetitive.compensator, z) * np.asarray(response)
+    return zdomain.zero_phase_gain(repetitive.q, z) * (1 - repetitive.gain * compensated)
 
 
 @dataclass(frozen=True)

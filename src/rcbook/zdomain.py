@@ -160,9 +160,9 @@ def evaluate(p: np.ndarray, z: ArrayLike) -> np.ndarray:
     return np.polynomial.polynomial.polyval(1 / np.asarray(z), p)
 
 
-def unit_circle(n: int) -> np.ndarray:
-    """n points e^(j 2 pi i/n) round the whole unit circle, beginning at z = 1."""
-    return np.exp(2j * np.pi * np.arange(n) / n)
+def unit_circle(n: int, first: float = 0.0) -> np.ndarray:
+    """n points e^(j 2 pi (i + first)/n) round the whole unit circle, by default from z = 1 on."""
+    return np.exp(2j * np.pi * (np.arange(n) + first) / n)
 
 
 def at_frequency(frequency: ArrayLike, dt: float) -> np.ndarray:
@@ -200,6 +200,58 @@ def zero_order_hold(system: control.StateSpace | control.TransferFunction, dt: f
     for _ in range(sampled.nstates):
         impulse.append((sampled.C @ state).item())
         state = sampled.A @ state
+    return _from_impulse(np.array(impulse), a, dt)
+
+
+def interval_integral(system: control.StateSpace, dt: float) -> Plant:
+    """From an input held over each interval to the integral of the output over that interval.
+
+    The sum of the results is the integral since the start, so a plant behind an integrator and a
+    difference (a moving average, the time that one pitch of a cutter takes) needs no pole at z = 1
+    that would have to be cancelled afterwards.  Worked out mode by mode, which keeps the relative
+    accuracy of coefficients however small fast poles make them.
+    Raises ValueError as `modes` does, and for an output that does not answer.
+    """
+    dt = real_number(dt, "sampling interval dt", positive=True)
+    poles, residues = modes(system)
+    moved, area = dt * phi1(poles * dt), dt**2 * phi2(poles * dt)
+    direct, decay = np.sum(residues * area), np.exp(poles * dt)
+    others = [np.poly(np.delete(decay, j)) for j in range(poles.size)]
+    through = (residues * moved**2) @ np.array(others)
+    b, a = direct * np.poly(decay) + np.append(0, through), np.poly(decay)
+    if not b[0]:
+        raise ValueError("the plant is zero: its output does not answer to its input")
+    return Plant(b.real, a.real, 1, dt)
+
+
+def modes(system: control.StateSpace) -> tuple[np.ndarray, np.ndarray]:
+    """Poles p and residues r of a continuous system, whose response is the sum of r/(s - p).
+
+    Raises ValueError for several inputs or outputs, a sampled system, a direct path, and poles that
+    repeat.
+    """
+    if not (system.issiso() and system.isctime()) or np.any(system.D):
+        raise ValueError("give one input, one output, continuous time and no direct path")
+    poles, vectors = np.linalg.eig(system.A)
+    if not poles.size or np.linalg.cond(vectors) > 1e12:
+        raise ValueError(f"poles {poles}: only distinct ones can be taken mode by mode")
+    return poles, (system.C @ vectors)[0] * np.linalg.solve(vectors, system.B)[:, 0]
+
+
+def phi1(x: np.ndarray) -> np.ndarray:
+    """(e^x - 1)/x, and 1 at x = 0; the mean of e^(x t) over 0 <= t <= 1."""
+    safe = np.where(x == 0, 1, x)
+    return np.where(x == 0, 1, np.expm1(safe) / safe)
+
+
+def phi2(x: np.ndarray) -> np.ndarray:
+    """(e^x - 1 - x)/x^2, and 1/2 at x = 0; by its series where the difference loses digits."""
+    safe = np.where(np.abs(x) < 1e-2, 1, x)
+    series = (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6)))) / 2
+    return np.where(np.abs(x) < 1e-2, series, (np.expm1(safe) - safe) / safe**2)
+
+
+def _from_impulse(impulse: np.ndarray, a: np.ndarray, dt: float) -> Plant:
     b = np.convolve(a, impulse)[: a.size]
     if not b.any():
         raise ValueError("the plant is zero: its output does not answer to its input")
@@ -232,18 +284,22 @@ def split_zeros(b: ArrayLike, radius: float = 1.0) -> tuple[np.ndarray, np.ndarr
 
 
 def zero_phase_inverse(
-    plant: Plant, radius: float = 1.0, normalisation: str = "peak"
+    plant: Plant,
+    radius: float = 1.0,
+    normalisation: str = "peak",
+    cancel_unstable: bool = False,
 ) -> NoncausalFilter:
     """Inverse C = z^delay A(z^-1) B-(z) / (b B+(z^-1)), so that plant * C = |B-|^2 / b >= 0.
 
     B- holds the zeros of magnitude `radius` or more; b is the peak of |B-|^2 over the unit circle
     ("peak", which keeps 0 <= plant * C <= 1), its value at z = 1 ("dc"), or the square of the sum
-    of absolute values of B- ("l1", never below the peak).
+    of absolute values of B- ("l1", never below the peak).  `cancel_unstable` inverts the model of
+    an unstable plant as well, which is of use only where the plant itself is another, stable one.
     Source: Tomizuka (1987); Horng (1989), eqs 15 and 18-20.
     Raises ValueError for an unstable plant, an unknown normalisation, a B- that vanishes at z = 1
     under "dc", and zeros on or outside the unit circle left to be cancelled.
     """
-    if not plant.is_stable:
+    if not (plant.is_stable or cancel_unstable):
         raise ValueError(
             f"the plant has a pole of magnitude {np.abs(plant.poles).max():.6g}, and an inverse "
             "would cancel it; stabilise the plant first (for example by PI control)"
