@@ -868,3 +868,97 @@ def test_noise_gain_of_exact_cancellation_has_the_closed_form():
         loop = repetitive.design(LAG, 7, gain)
         truth = gain / np.sqrt(1 - (1 - gain) ** 2)
         assert repetitive.noise_gain(loop) == pytest.approx(truth, rel=1e-10)  # rounding
+
+
+# ---- roots counted from a frequency response ----
+
+
+def random_loop(seed):
+    """A repetitive loop round a stable plant that is not the one it was designed for."""
+    rng = np.random.default_rng(seed)
+    poles = rng.uniform(-0.85, 0.85, int(rng.integers(1, 4)))
+    zeros = rng.choice([-2.0, -1.4, -0.5, 0.3, 0.7, 1.6], int(rng.integers(0, 3)))
+    b, delay = rng.uniform(0.5, 2) * np.atleast_1d(np.poly(zeros)), int(rng.integers(1, 4))
+    process = Process(Plant(b, np.poly(poles), delay, 1.0))
+    q = zdomain.binomial_q(int(rng.integers(0, 3)))
+    loop = repetitive.design(process, int(rng.integers(9, 40)), rng.uniform(0.2, 2.4), q)
+    return mismatched(loop, rng.uniform(0.7, 1.4), rng.uniform(-0.05, 0.05))
+
+
+RANDOM = [loop for loop in map(random_loop, range(60)) if loop.process.plant.is_stable]
+
+
+def respond(loop):
+    return lambda z: zdomain.response(loop.process.plant, z)
+
+
+def roots_outside(loop):
+    """From all roots of the characteristic polynomial, in coefficients and not in responses."""
+    return int(np.sum(np.abs(np.roots(repetitive.characteristic_polynomial(loop))) > 1))
+
+
+def test_unstable_roots_are_those_of_the_characteristic_polynomial():
+    found = [repetitive.unstable_roots(loop.repetitive, respond(loop)) for loop in RANDOM]
+    assert found == [roots_outside(loop) for loop in RANDOM]
+    assert sum(n == 0 for n in found) > 20 and len(set(found)) > 5  # both verdicts, many counts
+
+
+def test_unstable_roots_follow_the_plant_and_not_the_model():
+    """A mutant: the count of the model differs where the mismatch makes the loop unstable."""
+    later = [mismatched(loop, 1.3, 0.0, extra_delay=1) for loop in RANDOM]
+    found = [repetitive.unstable_roots(loop.repetitive, respond(loop)) for loop in later]
+    assert found == [roots_outside(loop) for loop in later]
+    assert found != [roots_outside(loop) for loop in RANDOM]
+
+
+@pytest.mark.parametrize("period", [2, 9, 40, 200])
+@pytest.mark.parametrize("gain, count", [(0.5, 0), (1.9, 0), (2.1, 1), (3.5, 1)])
+def test_exact_cancellation_has_all_its_roots_outside_from_a_gain_of_two_on(period, gain, count):
+    """z^N = 1 - k."""
+    rc = RepetitiveController(zdomain.NoncausalFilter([1.0], [1.0], 1), period, gain)
+    assert repetitive.unstable_roots(rc, lambda z: 1 / z) == count * period
+
+
+def test_a_measured_response_between_points_is_good_enough():
+    loop = RANDOM[3]
+    angle = np.linspace(0, np.pi, 400)
+    table = respond(loop)(np.exp(1j * angle))
+
+    def measured(z):
+        at = np.abs(np.angle(z))
+        return np.interp(at, angle, table.real) + 1j * np.interp(at, angle, table.imag)
+
+    assert repetitive.unstable_roots(loop.repetitive, measured) == roots_outside(loop)
+
+
+@pytest.mark.parametrize("gain", [2.0, 1e-300])
+def test_a_root_on_the_circle_cannot_be_counted(gain):
+    rc = RepetitiveController(zdomain.NoncausalFilter([1.0], [1.0], 1), 7, gain)
+    with pytest.raises(ValueError, match="a root lies on the unit circle near"):
+        repetitive.unstable_roots(rc, lambda z: 1 / z)
+
+
+def test_regeneration_is_what_is_left_of_a_period():
+    """q - k q C G, from the controller's own numerator z^-N k q C and from q."""
+    z = zdomain.unit_circle(101, 0.3)
+    for loop in RANDOM:
+        rc, plant = loop.repetitive, loop.process.plant
+        through = zdomain.evaluate(rc.numerator, z) / zdomain.evaluate(rc.compensator.a, z)
+        truth = zdomain.zero_phase_gain(rc.q, z) - through * z**rc.period * respond(loop)(z)
+        found = repetitive.regeneration(rc, zdomain.response(plant, z), z)
+        np.testing.assert_allclose(found, truth, atol=1e-10 * np.abs(truth).max())
+
+
+def test_regeneration_below_one_makes_the_loop_stable_and_not_the_other_way_round():
+    z = zdomain.unit_circle(4001, 0.5)
+    small = [
+        np.abs(repetitive.regeneration(loop.repetitive, respond(loop)(z), z)).max() < 1
+        for loop in RANDOM
+    ]
+    stable = [repetitive.stability(loop).verdict == "stable" for loop in RANDOM]
+    assert all(s for s, below in zip(stable, small, strict=True) if below)
+    assert any(small) and not all(stable)
+    # sufficient only: z^2 - z + 1/2 has roots of magnitude 0.71, and |1 - 0.5/z| reaches 1.5
+    rc = RepetitiveController(zdomain.NoncausalFilter([1.0], [1.0], 0), 1, 0.5)
+    assert np.abs(repetitive.regeneration(rc, 1 / z, z)).max() == pytest.approx(1.5, rel=1e-6)
+    assert repetitive.unstable_roots(rc, lambda z: 1 / z) == 0

@@ -1,9 +1,15 @@
 """Zero-phase inverse, zero split, zero-order hold and Q filters against other algorithms."""
 
+import decimal
+import math
+from decimal import Decimal
+from fractions import Fraction
+
 import control
 import numpy as np
 import pytest
 import scipy.integrate
+import scipy.linalg
 import scipy.optimize
 import scipy.signal
 
@@ -397,3 +403,202 @@ def test_symmetric_fir_has_the_gain_of_its_cosine_sum():
 def test_q_filters_that_are_symmetric_but_for_rounding_are_accepted():
     """scipy.signal.firwin returns such windows for some lengths (7 taps at 0.3, for one)."""
     zdomain.odd_symmetric([0.25, 0.5, np.nextafter(0.25, 1)])
+
+
+# ---- modes and integrals over an interval ----
+
+
+def stable_system(seed, order=None):
+    """A continuous system with distinct stable poles, some in pairs, seen in random coordinates."""
+    rng = np.random.default_rng(seed)
+    order = int(rng.integers(1, 7)) if order is None else order
+    blocks, left = [], order
+    while left:
+        decay = -(10 ** rng.uniform(-1, 1.5))
+        if left > 1 and rng.random() < 0.5:
+            swing = 10 ** rng.uniform(-1, 1)
+            blocks.append([[decay, swing], [-swing, decay]])
+        else:
+            blocks.append([[decay]])
+        left -= len(blocks[-1])
+    mix = np.linalg.qr(rng.normal(size=(order, order)))[0]
+    a = mix @ scipy.linalg.block_diag(*blocks) @ mix.T
+    return control.ss(a, rng.normal(size=(order, 1)), rng.normal(size=(1, order)), 0)
+
+
+def with_integral(system):
+    """The system and, as its last state, the integral of its output."""
+    n = system.nstates
+    a = np.block([[system.A, np.zeros((n, 1))], [system.C, np.zeros((1, 1))]])
+    return a, np.append(system.B, [[0]], axis=0)
+
+
+@pytest.mark.parametrize("dt", [0.02, 0.3])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_interval_integral_answers_as_the_matrix_exponential_does(seed, dt):
+    system = stable_system(seed)
+    a, b = with_integral(system)
+    whole = scipy.linalg.expm(dt * np.block([[a, b], [np.zeros((1, len(a) + 1))]]))
+    u = np.random.default_rng(seed).standard_normal(30)
+    state, integrals = np.zeros(len(a)), []
+    for value in u:
+        after = (whole @ [*state, value])[:-1]
+        integrals.append(after[-1] - state[-1])
+        state = after
+    plant = zdomain.interval_integral(system, dt)
+    assert plant.delay == 1 and plant.dt == dt
+    ours = scipy.signal.lfilter(plant.numerator, plant.a, np.append(u, 0))[1:]
+    # up to 6 poles close to 1 multiply the rounding of the recursion
+    np.testing.assert_allclose(ours, integrals, atol=1e-9 * np.abs(integrals).max())
+    late = scipy.signal.lfilter(plant.b, plant.a, u)[:-1]  # a mutant: one interval off
+    assert np.abs(late - integrals[1:]).max() > 1e-3 * np.abs(integrals).max()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_interval_integral_is_the_hold_of_the_integrated_plant_without_its_pole_at_one(seed):
+    system = stable_system(seed)
+    a, b = with_integral(system)
+    c = np.append(np.zeros(system.nstates), 1.0)
+    held = zdomain.zero_order_hold(control.ss(a, b, c, 0), 0.2)
+    plant = zdomain.interval_integral(system, 0.2)
+    assert held.delay == plant.delay
+    np.testing.assert_allclose(np.convolve(plant.a, [1, -1]), held.a, atol=1e-10)
+    # the hold sums products of its impulse response, which cancel
+    np.testing.assert_allclose(plant.b, held.b, atol=1e-10 * np.abs(held.b).max())
+
+
+def two_lags(fast, slow, dt):
+    """1/((s + fast)(s + slow)) held and integrated: b and a by its closed form in 80 digits."""
+    with decimal.localcontext(prec=80):
+        rates, dt = [Decimal(fast), Decimal(slow)], Decimal(dt)
+        gains = [1 / (rates[1] - rates[0]), 1 / (rates[0] - rates[1])]
+        decays = [(-p * dt).exp() for p in rates]
+        # a lag g/(s + p): g/p (1 - e^-pt), integrated g/p (t - (1 - e^-pt)/p)
+        at_once = [g / p * (dt - (1 - e) / p) for g, p, e in zip(gains, rates, decays, strict=True)]
+        later = [g / p**2 * (1 - e) ** 2 for g, p, e in zip(gains, rates, decays, strict=True)]
+        b = [
+            sum(at_once),
+            sum(later) - sum(at_once) * sum(decays),
+            sum(at_once) * decays[0] * decays[1] - later[0] * decays[1] - later[1] * decays[0],
+        ]
+        return [float(x) for x in b], [1.0, -float(sum(decays)), float(decays[0] * decays[1])]
+
+
+@pytest.mark.parametrize("fast, slow, dt", [(800, 2, "0.15"), (300, 40, "0.2"), (3, 1, "0.1")])
+def test_interval_integral_keeps_the_digits_of_small_coefficients(fast, slow, dt):
+    """The last coefficients are as small as e^-120, and right to many digits all the same."""
+    lags = control.ss([[-fast, 0], [1, -slow]], [[1], [0]], [[0, 1]], 0)
+    plant = zdomain.interval_integral(lags, float(dt))
+    b, a = two_lags(fast, slow, dt)
+    # e^x of x = -120 is known to 120 roundings; (3, 1, 0.1): differences of 1e-3 of the terms
+    np.testing.assert_allclose(plant.a, a, rtol=1e-12)
+    np.testing.assert_allclose(plant.b, b, rtol=1e-11)
+
+
+def test_interval_integral_of_slow_inputs_is_the_steady_output_times_the_interval():
+    for seed in SEEDS:
+        system = stable_system(seed)
+        plant = zdomain.interval_integral(system, 0.4)
+        gain = plant.b.sum() / plant.a.sum()
+        assert gain == pytest.approx(0.4 * system(0).real, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_modes_add_up_to_the_frequency_response(seed):
+    system = stable_system(seed)
+    poles, residues = zdomain.modes(system)
+    s = 1j * np.geomspace(1e-2, 1e3, 40)
+    found = np.sum(residues / (s[:, None] - poles), axis=-1)
+    # straight from the definition C (sI - A)^-1 B
+    truth = [
+        (system.C @ np.linalg.solve(x * np.eye(poles.size) - system.A, system.B)).item() for x in s
+    ]
+    np.testing.assert_allclose(found, truth, atol=1e-11 * np.abs(residues).max())
+    wrong = np.sum(residues / (s[:, None] - 1.01 * poles), axis=-1)
+    assert np.abs(wrong - truth).max() > 1e-4 * np.abs(truth).max()
+
+
+def exponential_series(x, first):
+    """sum of x^k/(k + first)! in exact fractions of the complex number x."""
+    re, im = Fraction(x.real), Fraction(x.imag)
+    power, total = (Fraction(1), Fraction(0)), [Fraction(0), Fraction(0)]
+    for k in range(60):
+        total = [t + p / math.factorial(k + first) for t, p in zip(total, power, strict=True)]
+        power = (power[0] * re - power[1] * im, power[0] * im + power[1] * re)
+    return complex(*map(float, total))
+
+
+TURNS = [1, -1, 1j, 0.6 + 0.8j, -0.8 + 0.6j]
+
+
+@pytest.mark.parametrize("turn", TURNS)
+@pytest.mark.parametrize("size", [1e-12, 1e-5, 9.9e-3, 1.01e-2, 0.1, 1.0, 4.0])
+def test_phi_functions_are_their_series(size, turn):
+    x = np.array([size * turn])
+    assert zdomain.phi1(x)[0] == pytest.approx(exponential_series(x[0], 1), rel=1e-14, abs=0)
+    # cut off after x^4: 2 (1e-2)^5/7!; from the difference: two roundings over |x|
+    assert zdomain.phi2(x)[0] == pytest.approx(exponential_series(x[0], 2), rel=1e-13, abs=0)
+
+
+def test_phi_functions_at_zero_and_far_out():
+    x = np.array([0.0, -700.0, -1e5])
+    np.testing.assert_allclose(zdomain.phi1(x), [1, 1 / 700, 1e-5], rtol=1e-15)
+    np.testing.assert_allclose(zdomain.phi2(x), [0.5, 699 / 700**2, (1e5 - 1) / 1e10], rtol=1e-15)
+
+
+TWO = control.ss(-np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2)))
+NOT_BY_MODES = {
+    "two inputs": (TWO, "give one input"),
+    "sampled": (control.ss([[0.5]], [[1]], [[1]], 0, 0.1), "give one input"),
+    "direct path": (control.ss([[-1]], [[1]], [[1]], 1), "no direct path"),
+    "double pole": (control.ss([[-1, 1], [0, -1]], [[0], [1]], [[1, 0]], 0), r"poles \[-1"),
+    "no state": (control.ss([], [], [], [[0]]), "poles"),
+}
+
+
+@pytest.mark.parametrize("system, message", NOT_BY_MODES.values(), ids=NOT_BY_MODES)
+def test_what_has_no_distinct_modes_is_refused(system, message):
+    with pytest.raises(ValueError, match=message):
+        zdomain.modes(system)
+    with pytest.raises(ValueError, match=message):
+        zdomain.interval_integral(system, 0.1)
+
+
+@pytest.mark.parametrize("dt", [0.0, -0.1, np.nan])
+def test_interval_integral_needs_an_interval(dt):
+    with pytest.raises(ValueError, match="dt"):
+        zdomain.interval_integral(stable_system(0), dt)
+
+
+def test_interval_integral_refuses_an_output_that_does_not_answer():
+    deaf = control.ss([[-1, 0], [0, -2]], [[1], [0]], [[0, 1]], 0)
+    with pytest.raises(ValueError, match="does not answer"):
+        zdomain.interval_integral(deaf, 0.1)
+
+
+# ---- points between those of the circle, and models of unstable plants ----
+
+
+@pytest.mark.parametrize("n", [1, 5, 8])
+def test_unit_circle_half_a_step_further_holds_the_roots_of_minus_one(n):
+    z = zdomain.unit_circle(n, 0.5)
+    np.testing.assert_allclose(z**n, -1, atol=1e-13)
+    assert z.size == n and np.unique(z.round(9)).size == n
+    np.testing.assert_allclose(z[0], np.cos(np.pi / n) + 1j * np.sin(np.pi / n), atol=1e-15)
+
+
+def test_an_unstable_plant_is_inverted_only_on_demand():
+    plant = Plant([2.0, -0.6], from_roots([1.3, 0.4]), 2, 0.1)  # zero at 0.3
+    with pytest.raises(ValueError, match=r"magnitude 1\.3"):
+        zdomain.zero_phase_inverse(plant)
+    law = zdomain.zero_phase_inverse(plant, cancel_unstable=True)
+    np.testing.assert_allclose(
+        zdomain.response(plant, CIRCLE) * zdomain.response(law, CIRCLE), 1, atol=1e-12
+    )
+    outside = Plant([1.0, 2.0], from_roots([1.3, 0.4]), 1, 0.1)  # zero at -2
+    law = zdomain.zero_phase_inverse(outside, cancel_unstable=True)
+    both = zdomain.response(outside, CIRCLE) * zdomain.response(law, CIRCLE)
+    np.testing.assert_allclose(both, np.abs(1 + 2 / CIRCLE) ** 2 / 9, atol=1e-12)
+    stable = Plant([1.0, 2.0], from_roots([0.8, 0.4]), 1, 0.1)
+    plain, forced = (zdomain.zero_phase_inverse(stable, cancel_unstable=x) for x in (False, True))
+    assert np.array_equal(plain.b, forced.b) and np.array_equal(plain.a, forced.a)

@@ -331,8 +331,10 @@ def unstable_roots(
     """
 
     def around(angle: np.ndarray) -> np.ndarray:
-        z = np.exp(1j * angle)
-        return 1 - regeneration(repetitive, plant(z), z) * z ** float(-repetitive.period)
+        z, response = np.exp(1j * angle), np.asarray(plant(np.exp(1j * angle)))
+        if response.shape != z.shape or not np.all(np.isfinite(response)):
+            raise ValueError("plant(z) holds NaN or infinity, or not one value for each z")
+        return 1 - regeneration(repetitive, response, z) * z ** float(-repetitive.period)
 
     n = 16 * repetitive.period
     angle = np.pi * (np.arange(n) + 0.5) / n

@@ -175,24 +175,48 @@ def frequency_response(
     It is that of the continuous machine behind its hold, summed over the aliases, and so holds for
     a torque that a sampled model of finite order cannot have: with the "memory" of eq. 8 averaged
     over the teeth, as well as "instantaneous" (eq. 14) and "none".
-    Raises ValueError for another torque and for z = 1 itself, where it is a limit.
+    Raises ValueError for another torque, for points off the circle and for z = 1 itself, where it
+    is a limit.
     """
     _one_of(torque, (*TORQUES, "none"), "torque")
+    aliases = whole_number(aliases, "aliases", 1)
     step, z = sampling_angle(mill), np.asarray(z, dtype=complex)
-    if np.any(z == 1):
-        raise ValueError("z = 1 is a limit of the response; leave it out")
+    if not np.all(np.abs(np.abs(z) - 1) < 1e-9) or np.any(z == 1):
+        raise ValueError("give points of the unit circle, and not z = 1, which is a limit")
     turn = np.angle(z)[..., None] + 2 * np.pi * np.arange(-aliases, aliases + 1)
     sigma = 1j * turn / step
     hold, memory = ((1 - np.exp(-sigma * span)) / (sigma * span) for span in (step, mill.pitch))
-    slope = {"memory": mill.torque_slope * memory, "instantaneous": mill.torque_slope, "none": 0}
-    driven = spindle_drive.in_angle(spindle_drive.speed_driven(mill.drive), mill.speed)
-    by_command, by_load = (
-        sum(r / (sigma - p) for p, r in zip(*zdomain.modes(driven["speed", name]), strict=True))
-        for name in ("command", "load")
-    )
-    speed = by_command / (1 - by_load * slope[torque])
+    speed = _speed_response(mill, sigma, "command") / _cut_alone(mill, sigma, torque)
     gain = -mill.cutting_coefficient * mill.depth * mill.feed_speed / mill.speed**2
     return np.sum(hold * gain * mill.pitch * memory * speed, axis=-1)
+
+
+def is_stable(mill: FaceMill, torque: str = "memory") -> bool:
+    """Whether drive and cut alone are stable, without repetitive control.
+
+    The zeros of 1 minus the loop through drive and cut in the right half plane are counted along
+    the imaginary axis, up to the 100th harmonic of the turn.
+    Raises ValueError for another torque, and when a zero lies too close to the axis to tell.
+    """
+    _one_of(torque, (*TORQUES, "none"), "torque")
+    curve = _cut_alone(mill, 1j * np.linspace(-100, 100, 200_000), torque)
+    turned = np.angle(np.append(curve[1:], curve[:1]) / curve)
+    if np.abs(turned).max() > 1:
+        raise ValueError(f"depth {mill.depth!r} m: on the edge of stability; change it a little")
+    return round(turned.sum() / (2 * np.pi)) == 0
+
+
+def _cut_alone(mill: FaceMill, sigma: np.ndarray, torque: str) -> np.ndarray:
+    """1 - (drive from torque to speed)(slope of the torque over the speed), without aliases."""
+    memory = (1 - np.exp(-sigma * mill.pitch)) / (sigma * mill.pitch)
+    slope = {"memory": mill.torque_slope * memory, "instantaneous": mill.torque_slope, "none": 0}
+    return 1 - _speed_response(mill, sigma, "load") * slope[torque]
+
+
+def _speed_response(mill: FaceMill, sigma: np.ndarray, source: str) -> np.ndarray:
+    driven = spindle_drive.in_angle(spindle_drive.speed_driven(mill.drive), mill.speed)
+    poles, residues = zdomain.modes(driven["speed", source])
+    return sum(r / (sigma - p) for p, r in zip(poles, residues, strict=True))
 
 
 class Controller(Protocol):
@@ -279,9 +303,10 @@ class Run:
     def during(self, turn: int) -> slice:
         """The values of a turn counted from 1, or from the end: -1 is the last turn."""
         per_turn, turns = self.experiment.steps_per_turn, self.experiment.turns
-        if not 1 <= abs(turn) <= turns:
+        size = whole_number(abs(turn), "turn", 0)
+        if not 1 <= size <= turns:
             raise ValueError(f"turn {turn}: the run has turns 1 to {turns}, or -1 for the last")
-        first = (turn - 1 if turn > 0 else turns + turn) * per_turn
+        first = (size - 1 if turn > 0 else turns - size) * per_turn
         return slice(first + 1, first + 1 + per_turn)
 
 
@@ -295,7 +320,9 @@ def simulate_all(experiments: Sequence[Experiment]) -> list[Run]:
 
     Within a step of the angle the cutting torque is held at its value in the middle, and the drive,
     linear between two switchings of its limit, moves on exactly; the step lasts until the angle is
-    reached.  So fast modes of the drive limit no step, and halving the step quarters the error.
+    reached.  So fast modes of the drive limit no step, and halving the step quarters the error
+    where teeth enter and leave at the ends of steps; other entries and exits, and the switching of
+    the limit, are met to within a step.
     Source: Tsao and Pong (1991), eqs 6-9 and 12.
     """
     experiments = list(experiments)
@@ -318,7 +345,8 @@ def tooth_forces(run: Run) -> np.ndarray:
     cut, back = _cut([one]), one.mill.samples_per_pitch * one.substeps
     before = run.time[0] - np.arange(back, 0, -1) * 2 * np.pi / one.steps_per_turn / one.mill.speed
     elapsed = run.time - np.concatenate([before, run.time])[: run.time.size]
-    return np.array([cut.forces(2 * k, np.array([t]))[:, 0] for k, t in enumerate(elapsed)])
+    forces = np.array([cut.forces(2 * k, np.array([t]))[:, 0] for k, t in enumerate(elapsed)])
+    return np.where(np.isnan(run.force)[:, None], np.nan, forces)
 
 
 def pitch_peaks(run: Run) -> np.ndarray:
@@ -364,15 +392,16 @@ def _side_by_side(group: list[Experiment]) -> list[Run]:
     seen, error, sent = np.zeros((3, law.reach + steps // every, len(group)))
     moving = np.ones(len(group), dtype=bool)
     for step in range(steps):
-        now, speed = back + step, state[0]
+        now, speed, trend = back + step, state[0], (state[0] - log[step - 1, 1]) / 2
         if step % every == 0:
             k = law.reach + step // every
             seen[k] = law.measure(log[max(0, step - back + 1) : step + 1], every)
             at_work = moving & (step // every >= law.first)
             error[k] = np.where(at_work, law.target - seen[k], 0.0)
             sent[k] = law.answer(error, sent, k)
+        ahead = speed + np.where(moving & (step > 0), trend, 0.0)  # speed in the middle
         guess = clock[now] + angle / 2 / speed
-        _, load, _ = cut.loads(2 * step + 1, guess - middle[step], speed)
+        _, load, _ = cut.loads(2 * step + 1, guess - middle[step], ahead)
         inputs = np.array([law.base + sent[k], load])
         seconds, after, limited = _turn(modes, state, inputs, law.holds, angle)
         moving = moving & (after[0] > STANDSTILL * rest[0])
@@ -502,7 +531,7 @@ class _Cut(NamedTuple):
         """Which teeth cut, and the chip thickness in m, after `elapsed` s for the last pitch."""
         at, held = half % len(self.sines), (half - 1 + half % 2) % len(self.sines)
         since = half - 1 + half % 2 - self.one_by_one * self.entered[held]
-        cutting = self.inside[held] & (since >= self.first)
+        cutting = self.inside[held] & (since > self.first - 0.5)
         return cutting, self.sines[at] * (self.feed_speed * elapsed) + self.runout
 
     def forces(self, half: int, elapsed: np.ndarray) -> np.ndarray:
