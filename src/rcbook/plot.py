@@ -139,7 +139,7 @@ def draw_teeth(
     turn = np.linspace(0, 2 * np.pi, 361)
     ax.plot(turn, 0 * turn, color="0.3", linewidth=1.0, linestyle="-", zorder=3)
     circle = {"color": "C1", "linewidth": 1.3, "linestyle": (0, (4, 2)), "zorder": 4}
-    named = None if outlined else f"reference, {reference:.3g}"
+    named = None if outlined else f"nominal, {reference:.3g} N"
     ax.plot(turn, 0 * turn + reference, label=named, **circle)
     ax.set_theta_zero_location("N")
     ax.set_xticks(angle, [f"{i + 1}" for i in range(values.size)])

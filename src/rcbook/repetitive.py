@@ -332,27 +332,16 @@ def unstable_roots(
 
     def around(angle: np.ndarray) -> np.ndarray:
         z, response = np.exp(1j * angle), np.asarray(plant(np.exp(1j * angle)))
-        if response.shape != z.shape or not np.all(np.isfinite(response)):
-            raise ValueError("plant(z) holds NaN or infinity, or not one value for each z")
+        if response.shape != z.shape:
+            raise ValueError(f"plant(z) has shape {response.shape} for {z.size} points z")
         return 1 - regeneration(repetitive, response, z) * z ** float(-repetitive.period)
 
-    n = 16 * repetitive.period
-    angle = np.pi * (np.arange(n) + 0.5) / n
-    value = around(angle)
-    for _ in range(30):
-        mirrored = np.concatenate([value[:1].conj(), value, value[-1:].conj()])
-        turned = np.angle(mirrored[1:] / mirrored[:-1])
-        coarse = np.flatnonzero(np.abs(turned) > 1)
-        if not coarse.size:
-            return -round((2 * turned[1:-1].sum() + turned[0] + turned[-1]) / (2 * np.pi))
-        edges = np.concatenate([[0.0], angle, [np.pi]])
-        between = (edges[coarse] + edges[coarse + 1]) / 2
-        angle, value = np.append(angle, between), np.append(value, around(between))
-        order = np.argsort(angle)
-        angle, value = angle[order], value[order]
-    raise ValueError(
-        f"a root lies on the unit circle near an angle of {between[0]:.9g} rad, or too close to it"
-    )
+    # The ends, next to z = 1 and z = -1, are closed by their mirror images.
+    inset = np.pi * 1e-6
+    turned = zdomain.turns_round_origin(around, inset, np.pi - inset, 16 * repetitive.period)
+    first, last = around(np.array([inset, np.pi - inset]))
+    closing = np.angle(first / first.conj()) + np.angle(last.conj() / last)
+    return -round(2 * turned + closing / (2 * np.pi))
 
 
 def regeneration(repetitive: RepetitiveController, response: ArrayLike, z: ArrayLike) -> np.ndarray:

@@ -5,7 +5,7 @@ Polynomials in z^-1 are 1-D arrays, lowest power first: ``[1, -0.5]`` is 1 - 0.5
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from numbers import Integral, Real
 
@@ -153,6 +153,30 @@ def multiply(*factors: np.ndarray) -> np.ndarray:
     for p in factors:
         product = np.convolve(product, p)
     return product
+
+
+def turns_round_origin(
+    curve: Callable[[np.ndarray], np.ndarray], start: float, stop: float, n: int
+) -> float:
+    """How often a curve turns round the origin, anticlockwise, as its parameter runs.
+
+    The grid, n points first, is refined until no step turns by more than 1 rad.
+    Raises ValueError when the curve holds NaN, or passes the origin too close to tell.
+    """
+    at = np.linspace(start, stop, n)
+    value = curve(at)
+    for _ in range(40):
+        if value.shape != at.shape or not np.all(np.isfinite(value)):
+            raise ValueError("the curve holds NaN or infinity, or not one value for each point")
+        turned = np.angle(value[1:] / value[:-1])
+        coarse = np.flatnonzero(np.abs(turned) > 1)
+        if not coarse.size:
+            return float(turned.sum() / (2 * np.pi))
+        between = (at[coarse] + at[coarse + 1]) / 2
+        at, value = (
+            np.insert(old, coarse + 1, new) for old, new in ((at, between), (value, curve(between)))
+        )
+    raise ValueError(f"the curve passes the origin near {between[0]:.9g}, too close to count")
 
 
 def evaluate(p: np.ndarray, z: ArrayLike) -> np.ndarray:
