@@ -609,7 +609,7 @@ def test_a_second_set_of_bars_leaves_the_first_to_be_seen():
     assert not after.get_fill()
     assert after.get_width() < before.get_width()
     labels = ax.get_legend_handles_labels()[1]
-    assert sorted(labels) == ["after", "before", "reference, 1"]
+    assert sorted(labels) == ["after", "before", "nominal, 1 N"]
     assert ax.get_ylim()[0] == 0.0
 
 
