@@ -602,3 +602,19 @@ def test_an_unstable_plant_is_inverted_only_on_demand():
     stable = Plant([1.0, 2.0], from_roots([0.8, 0.4]), 1, 0.1)
     plain, forced = (zdomain.zero_phase_inverse(stable, cancel_unstable=x) for x in (False, True))
     assert np.array_equal(plain.b, forced.b) and np.array_equal(plain.a, forced.a)
+
+
+@pytest.mark.parametrize("roots", [[0.5], [2.0], [0.5, -0.3j, 1.5], [0.999, 0.98j, 1.001]])
+def test_turns_round_the_origin_count_the_roots_inside(roots):
+    def around(angle):
+        return np.prod([np.exp(1j * angle) - root for root in roots], axis=0)
+
+    turns = zdomain.turns_round_origin(around, 0.0, 2 * np.pi, 5)
+    assert turns == pytest.approx(sum(abs(root) < 1 for root in roots), abs=1e-9)
+
+
+def test_turns_round_the_origin_refuses_a_curve_through_it():
+    with pytest.raises(ValueError, match="passes the origin near"):
+        zdomain.turns_round_origin(lambda x: x - 0.3 + 0j, 0.0, 1.0, 7)
+    with pytest.raises(ValueError, match="NaN or infinity"):
+        zdomain.turns_round_origin(lambda x: np.full(x.size, np.nan), 0.0, 1.0, 7)
