@@ -17,7 +17,7 @@ from matplotlib.transforms import Bbox
 
 from rcbook import diagrams, plot
 from rcbook.diagrams import Block, Frame, Node, Sum, Wire, draw_block_diagram
-from rcbook.machines import face_mill, lathe
+from rcbook.machines import boring_bar, face_mill, lathe
 
 F_REF, V_PI = r"$F_\mathrm{ref}$", r"$V_\mathrm{PI}$"
 
@@ -65,8 +65,12 @@ LAYOUTS = {
     "spindle drive": diagrams.draw_spindle_drive,
     "angle loop": diagrams.draw_angle_loop,
     "face mill": diagrams.draw_face_mill_setup,
+    "boring": diagrams.draw_boring_setup,
+    "periodic sampling": diagrams.draw_periodic_sampling,
+    "periodic loop": diagrams.draw_periodic_loop,
+    "regeneration": diagrams.draw_regeneration,
 }
-MACHINES = {"milling", "lathe", "face mill"}
+MACHINES = {"milling", "lathe", "face mill", "boring", "periodic sampling", "regeneration"}
 ROUND = {"learning", "angle loop"}  # whose signals all go round
 
 
@@ -585,6 +589,160 @@ def test_the_drawn_chip_is_about_as_thick_as_the_label_says():
     assert own - last == pytest.approx(expected, rel=0.1)
 
 
+# --- boring at a varying speed -------------------------------------------------------------------
+
+
+def test_boring_names_every_part_of_the_loop():
+    _, ax = rendered(diagrams.draw_boring_setup)
+    words = " ".join(t.get_text().replace("\n", " ") for t in ax.texts)
+    parts = ("encoder", "chuck", "workpiece", "boring bar", "piezo", "holder", "feed", "46 µm")
+    signals = ("240 samples", r"$\Delta\theta$ = 1.5°", "$v(k)$", "$y(k)$", "$y$", r"$\theta$")
+    chain = ("computer", "amplifier", r"\omega_0\,[1+\mathrm{RVA}", r"$\omega$")
+    assert [part for part in (*parts, *signals, *chain) if part not in words] == []
+
+
+@pytest.mark.parametrize(("samples", "step"), [(240, "1.5°"), (360, "1°")])
+def test_the_trigger_angle_belongs_to_the_samples_of_a_turn(samples, step):
+    _, ax = plt.subplots()
+    diagrams.draw_boring_setup(ax, samples)
+    words = [t.get_text() for t in ax.texts]
+    assert f"{samples} samples a turn" in words
+    assert any(w.endswith(f"= {step}") for w in words)
+
+
+def tools(ax):
+    dark = [p for p in ax.patches if isinstance(p, Polygon) and p.get_facecolor()[0] < 0.5]
+    return [p.get_xy()[:-1] for p in dark if len(p.get_xy()) == 5]
+
+
+def test_the_tool_is_at_the_wall_of_the_bore_in_both_views():
+    _, ax = rendered(diagrams.draw_boring_setup)
+    side, end = sorted(tools(ax), key=lambda xy: xy[:, 0].min())
+    wall = diagrams._LEVEL + float(diagrams._bore_radius(0.0))
+    assert side[:, 1].max() == end[:, 1].max() == pytest.approx(wall)
+    assert side[np.argmax(side[:, 1]), 0] == diagrams._EDGE
+    offset = end - diagrams._END
+    turn = np.arctan2(*offset.T)
+    assert np.all(np.hypot(*offset.T) <= diagrams._bore_radius(turn) + 1e-9)
+
+
+def test_the_bar_fits_into_the_bore_and_the_bore_into_the_pipe():
+    radius = diagrams._bore_radius(np.linspace(0, 2 * np.pi, 361))
+    assert diagrams._ROD < diagrams._ROUGH < radius.min()
+    assert radius.max() < diagrams._PIPE < diagrams._JAWS
+    mean, oval = diagrams._BORE, diagrams._OVAL
+    assert (radius.min(), radius.max()) == pytest.approx((mean - oval, mean + oval), rel=1e-3)
+
+
+def test_samples_lie_on_the_bore_at_equal_angles_one_at_the_mark_and_one_at_the_tool():
+    _, ax = rendered(diagrams.draw_boring_setup)
+    dots = np.array([c[:2] for c in outlines(ax)[1] if c[2] == 0.055]) - diagrams._END
+    angle = np.arctan2(*dots.T)
+    np.testing.assert_allclose(np.hypot(*dots.T), diagrams._bore_radius(angle), rtol=1e-12)
+    np.testing.assert_allclose(np.diff(np.sort(angle)), 2 * np.pi / diagrams._DOTS, rtol=1e-9)
+    for at in (0.0, diagrams._TURNED):
+        assert np.abs(angle - at).min() < 1e-12
+
+
+def test_boring_wires_end_on_the_blocks_they_feed():
+    _, ax = rendered(diagrams.draw_boring_setup)
+    at = {t.get_text(): t.get_position() for t in ax.texts}
+    sizes = {(round(x + w / 2, 6), round(y + h / 2, 6)): (w, h) for x, y, w, h in outlines(ax)[0]}
+    (x, y), (width, height) = at["computer"], sizes[at["computer"]]
+    amplifier = at["amplifier"]
+    into_amplifier = (amplifier[0] - sizes[amplifier][0] / 2, amplifier[1])
+    into_holder = (amplifier[0], at["holder"][1] - sizes[at["holder"]][1] / 2)
+    for tip in ((x - width / 2, y), (x, y + height / 2), into_amplifier, into_holder):
+        assert sum(np.allclose(head, tip) for head in heads(ax)) == 1
+    assert abs(into_holder[0] - at["holder"][0]) < sizes[at["holder"]][0] / 2
+
+
+def test_the_strip_shows_the_intervals_of_the_speed_law():
+    """One turn per period of the speed, at a mean of 2 pi rad/s, so that the period is 1 s."""
+    angle, time = diagrams._sampling_instants()
+    n = diagrams._STEPS
+
+    def speed(t):
+        return boring_bar.relative_speed_law(t, 2 * np.pi, diagrams._SWING, 1.0)
+
+    expected = boring_bar.angle_triggered_intervals(speed, 2 * np.pi / n, n)
+    np.testing.assert_allclose(np.diff(angle), 1 / n)
+    np.testing.assert_allclose(np.diff(time), expected, atol=1e-5)
+
+
+def test_lines_of_the_strip_join_equal_steps_to_the_instants_of_the_speed_samples():
+    _, ax = rendered(diagrams.draw_periodic_sampling)
+    levels = (diagrams._ANGLES, diagrams._TIMES)
+    joined = [c.get_xdata() for c in ax.lines if tuple(c.get_ydata()) == levels]
+    above, below = np.sort(np.array(joined).T)
+    assert len(above) == diagrams._STEPS + 1
+    np.testing.assert_allclose(np.diff(above), np.diff(above)[0])
+    dots = sorted(x for x, _, _ in outlines(ax)[1])
+    np.testing.assert_allclose(dots, below)
+    gaps, at = np.diff(below), {t.get_text(): t.get_position()[0] for t in ax.texts}
+    for word, k in (("short $T(k)$", np.argmin(gaps)), ("long $T(k)$", np.argmax(gaps))):
+        assert below[k] < at[word] < below[k + 1]
+
+
+def test_the_periodic_loop_names_every_signal_once_and_subtracts_only_the_output():
+    _, ax = rendered(diagrams.draw_periodic_loop)
+    words = [t.get_text() for t in ax.texts]
+    signals = [f"${s}(k)$" for s in "rewuvy"] + ["$v(t)$", "$y(t)$"]
+    blocks = ["$Q\\,q^{-(N-L)}$", "$q^{-L}$", "$G_c(k)$", "$G(s)$", "hold $T(k)$"]
+    assert [words.count(s) for s in (*signals, *blocks)] == [1] * 13
+    assert (words.count("+"), words.count("−")) == (3, 1)
+
+
+def test_the_periodic_loop_runs_right_above_and_left_below():
+    _, ax = rendered(diagrams.draw_periodic_loop)
+    at = {t.get_text(): t.get_position() for t in ax.texts}
+    above = [at[f"${s}(k)$"][0] for s in "rewuv"]
+    below = [at[s][0] for s in ("hold $T(k)$", "$v(t)$", "$G(s)$", "$y(t)$", "$y(k)$")]
+    assert above == sorted(above)
+    assert below == sorted(below, reverse=True)
+    x, y, _ = min(outlines(ax)[1], key=lambda c: (c[2] < 0.2, c[0]))  # the left sum
+    np.testing.assert_allclose(np.subtract(at["−"], (x, y)), diagrams._SIGN_SPOTS["s"])
+
+
+# --- regenerative chatter ------------------------------------------------------------------------
+
+
+def test_regeneration_names_the_oscillator_and_the_chip():
+    _, ax = rendered(diagrams.draw_regeneration)
+    words = " ".join(t.get_text().replace("\n", " ") for t in ax.texts)
+    oscillator = ("mass $m$", "$k$", "$c$", "$x$", "tool", "workpiece", "phase shift", "chip")
+    law = ("$h(t)=h_0+x(t-\\tau)-x(t)$", "$h(t)$", "$h_0$", "$x(t-\\tau)$", "$x(t)$", "$K\\,h(t)$")
+    assert [part for part in (*oscillator, *law) if part not in words] == []
+
+
+def test_the_chip_is_measured_at_the_edge_of_the_tool_from_one_surface_to_the_other():
+    _, ax = rendered(diagrams.draw_regeneration)
+    tip = diagrams._TIP
+    low, high = float(diagrams._cut_surface(tip)), float(diagrams._last_surface(tip))
+    (label,) = (t for t in ax.texts if t.get_text() == "$h(t)$")
+    ends = [y for x, y in heads(ax) if abs(x - label.get_position()[0]) < 0.8 and 1.5 < y < 4.0]
+    assert sorted(ends) == pytest.approx([low, high])
+    (tool,) = tools(ax)
+    assert tuple(tool[np.argmin(tool[:, 1])]) == pytest.approx((tip, low))
+
+
+def test_the_tool_always_cuts_and_has_just_the_marks_of_its_own_path_behind_it():
+    _, ax = rendered(diagrams.draw_regeneration)
+    x = np.linspace(*diagrams._CUT_PIECE[:2], 2000)
+    assert np.all(diagrams._last_surface(x) > diagrams._cut_surface(x))
+    (tool,) = tools(ax)
+    edge = np.linspace(tool[0], tool[-1], 50)[1:]  # its relief, from the tip
+    assert np.all(edge[:, 1] > diagrams._cut_surface(edge[:, 0]))
+
+
+def test_the_drawn_lag_is_one_at_which_the_last_wave_feeds_the_vibration():
+    """Work per cycle of the force K x(t - tau), which pushes the tool out of the cut."""
+    cycle = np.linspace(0, diagrams._WAVE, 400, endpoint=False)
+    x = diagrams._cut_surface(diagrams._TIP - cycle)  # time goes on to the left
+    before = diagrams._last_surface(diagrams._TIP - cycle)
+    assert np.sum(before * np.gradient(x)) > 0
+
+
 # --- teeth and chips -----------------------------------------------------------------------------
 
 
@@ -638,6 +796,47 @@ def test_cutters_with_the_same_feed_share_their_scale():
         assert ax.lines[0].get_xdata().max() == pytest.approx(0.05 + 200 * 60e-6)
     assert axes[0].get_xlim() == axes[1].get_xlim()
     assert axes[0].get_ylim() == axes[1].get_ylim()
+
+
+# --- a bore --------------------------------------------------------------------------------------
+
+ANGLE = 2 * np.pi * np.arange(480) / 240  # two turns
+ELLIPSE = 23e-6 * np.sin(2 * ANGLE)
+
+
+def bore(*calls, **kwargs):
+    _, ax = plt.subplots(subplot_kw={"projection": "polar"})
+    for call in calls:
+        assert plot.draw_bore(ax, ANGLE, ELLIPSE, *call, **kwargs) is ax
+    ax.get_figure().draw_without_rendering()
+    return ax
+
+
+def test_a_bore_is_what_is_desired_less_the_magnified_error_in_micrometres():
+    ax = bore((4e-6 * np.cos(ANGLE), 2, "cut"))
+    circle, desired, cut = ax.lines
+    assert np.all(circle.get_ydata() == 0)
+    np.testing.assert_allclose(desired.get_ydata()[:-1], 1e6 * ELLIPSE)
+    drawn = 1e6 * ELLIPSE - 8 * np.cos(ANGLE)
+    np.testing.assert_allclose(cut.get_ydata(), [*drawn, drawn[0]])  # closed
+    assert ax.get_rmax() >= np.abs(drawn).max()
+    assert ax.get_rmin() == -ax.get_rmax()
+    assert [t.get_text() for t in ax.texts] == ["rings\n±20 µm\nerror 2×"]
+
+
+def test_a_second_cut_repeats_neither_profile_nor_words_and_is_not_clipped():
+    ax = bore((0 * ANGLE, 1, "good"), (30e-6 * np.sin(ANGLE), 1, "bad"))
+    assert ax.get_legend_handles_labels()[1] == ["desired", "good", "bad"]
+    assert len(ax.lines) == 4
+    assert [t.get_text() for t in ax.texts] == ["rings\n±20 µm"]
+    assert ax.get_rmax() >= 53
+    assert len({c.get_linestyle() for c in ax.lines[2:]}) == 2
+
+
+def test_bores_with_the_same_reach_share_their_scale():
+    one, other = (bore((e * np.sin(ANGLE), 1), reach=35e-6) for e in (1e-6, 5e-6))
+    assert one.get_rmax() == other.get_rmax() == pytest.approx(35)
+    assert one.get_rorigin() == other.get_rorigin()
 
 
 # --- the style -----------------------------------------------------------------------------------

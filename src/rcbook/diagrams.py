@@ -404,6 +404,47 @@ def draw_angle_loop(ax: Axes, step: str = "9°") -> Axes:
     return draw_block_diagram(ax, items, wires)
 
 
+def draw_periodic_loop(ax: Axes, plant: str = "$G(s)$", step: str = r"$\Delta\theta$") -> Axes:
+    """Draw the repetitive loop whose hold and sampler act every `step` of the spindle's turn.
+
+    Above, from left to right, is the controller, which repeats every N samples; below, from right
+    to left, the plant in continuous time.  Made for a figure of about 8 by 4 inches.
+    """
+    size = {"width": 2.0, "height": 1.4}
+    items = [
+        Sum("error", (1.7, 0.0)),
+        Sum("learned", (4.1, 0.0), {"w": "+", "n": "+"}),
+        Block("memory", r"$Q\,q^{-(N-L)}$", (7.15, 0.0), fill=FOCUS),
+        Block("rest", "$q^{-L}$", (7.15, 1.5), fill=FOCUS),
+        Node("tap", (9.4, 0.0)),
+        Block("compensator", "$G_c(k)$", (12.0, 0.0), fill=FOCUS),
+        Block("hold", "hold $T(k)$", (14.4, -2.6), icon=_HELD, **size),
+        Block("plant", plant, (9.4, -2.6), fill=PLANT, **size),
+        Block("sampler", "sampled\n$T(k)$", (4.4, -2.6), **size),
+        Node("y", (1.7, -2.6)),
+        Block("spindle", f"encoder, every {step}", (9.4, -4.5)),
+        Frame("period", (6.55, 0.6), 6.4, 3.6, title="memory of one period"),
+    ]
+    wires = [
+        Wire((0.0, 0.0), "error", "$r(k)$"),
+        Wire("error", "learned", "$e(k)$"),
+        Wire("learned", "memory", "$w(k)$"),
+        Wire("memory", "tap"),
+        Wire("tap", "rest", via=1.5),
+        Wire("rest", "learned", via=1.5),
+        Wire("tap", "compensator", "$u(k)$"),
+        Wire("compensator", "hold", "$v(k)$"),
+        Wire("hold", "plant", "$v(t)$"),
+        Wire("plant", "sampler", "$y(t)$"),
+        Wire("sampler", "y", "$y(k)$"),
+        Wire("y", "error"),
+        Wire("y", (0.0, -2.6)),
+        Wire("spindle", "hold", dashed=True),
+        Wire("spindle", "sampler", dashed=True),
+    ]
+    return draw_block_diagram(ax, items, wires)
+
+
 def draw_waviness(
     ax: Axes,
     eccentricity: float,
@@ -873,6 +914,385 @@ def _draw_radius(ax: Axes) -> None:
     ax.plot(left + (right - left) * angle / (2 * np.pi), height, color=INK, linestyle="-")
     now = (left + (right - left) * _ANGLE / (2 * np.pi), np.interp(_ANGLE, angle, height))
     ax.add_patch(Circle(now, 1.4 * _DOT, facecolor=INK, linewidth=0, zorder=4))
+
+
+# --- boring at a varying speed -------------------------------------------------------------------
+
+_LEVEL = 5.15  # height of the spindle axis
+_END = (13.3, _LEVEL)  # centre of the view along the axis
+_JAWS, _PIPE = 2.15, 1.62  # outer radii of chuck and workpiece
+_BORE, _OVAL = 1.1, 0.16  # mean radius and amplitude of the bore; the amplitude is exaggerated
+_ROUGH = 0.8  # radius before this pass
+_ROD = 0.42  # radius of the boring bar
+_EDGE = 4.95  # where the tool is along the axis
+_TURNED = np.radians(30.0)  # by which the spindle has turned since its mark faced the tool
+_DOTS = 24  # samples drawn in a turn
+
+
+def draw_boring_setup(ax: Axes, samples: int = 240) -> Axes:
+    """Draw noncircular boring, in section and along the axis, and the signals round the computer.
+
+    The encoder triggers `samples` a turn, of which 24 are drawn, at equal angles while the speed
+    varies.  Made for a figure of about 8 by 4.2 inches; the ellipse is exaggerated.
+    """
+    font = 1.08 * _fit(ax, (0.0, 0.2, 16.5, 8.6))
+    _draw_boring_section(ax)
+    _draw_boring_bar(ax)
+    _draw_boring_end(ax)
+    _draw_boring_signals(ax, font)
+    _annotate(ax, _boring_notes(samples), font)
+    return ax
+
+
+def _boring_notes(samples: int) -> list[_Note]:
+    """The words on the picture, and the line from a word to what it names."""
+    law = r"speed $\omega(t)=\omega_0\,[1+\mathrm{RVA}\,\sin(\mathrm{RVF}\,\omega_0\,t)]$"
+    every = "trigger every\n" + rf"$\Delta\theta$ = {360 / samples:g}°"
+    bore = _Label(11.1, 1.4, "elliptical bore,\n46 µm peak to peak", "left")
+    wall, dot = (tuple(_bored(np.radians(at))) for at in (190.0, -30.0))
+    return [
+        (_Label(0.2, 8.2, law, "left"), None),
+        (_Label(1.4, 2.3, every, "left"), None),
+        (_Label(3.1, 7.55, "chuck"), None),
+        (_Label(5.5, 7.1, "workpiece"), None),
+        (_Label(5.98, _LEVEL + 0.76, "$y$"), None),
+        (_Label(6.7, 6.6, "boring bar", "left"), ((7.4, 6.32), (7.4, _LEVEL + _ROD))),
+        (_Label(6.75, 4.2, "piezo", "left"), ((6.65, 4.25), (5.25, _LEVEL - 0.15))),
+        (_Label(10.5, _LEVEL + 0.42, "feed"), None),
+        (_Label(12.6, 8.2, f"{samples} samples a turn", "right"), ((11.7, 7.93), dot)),
+        (_Label(*_ahead(2.95, 0.55 * _TURNED), r"$\theta$"), None),
+        (_Label(*_ahead(2.85, np.radians(78.0)), r"$\omega$"), None),
+        (bore, ((12.6, 2.05), wall)),
+    ]
+
+
+def _ahead(radius: np.ndarray | float, angle: np.ndarray | float) -> np.ndarray:
+    """Points of the view along the axis, at an angle clockwise from the tool, which is on top."""
+    return _seen(radius, angle) + np.subtract(_END, _AXIS)
+
+
+def _bore_radius(angle: np.ndarray | float) -> np.ndarray:
+    """Radius of the finished bore at an angle clockwise from the tool."""
+    return _BORE + _OVAL * np.cos(2 * (_TURNED - np.asarray(angle)))
+
+
+def _bored(angle: np.ndarray | float) -> np.ndarray:
+    """Points on the finished bore."""
+    return _ahead(_bore_radius(angle), angle)
+
+
+def _draw_boring_section(ax: Axes) -> None:
+    """Spindle, chuck with jaws, and the workpiece cut open along the axis."""
+    ink = {"edgecolor": INK, "linewidth": _LINE}
+    ax.add_patch(Rectangle((2.1, _LEVEL - 0.4), 0.7, 0.8, facecolor=PLANT, zorder=0.5, **ink))
+    corner = (2.75, _LEVEL - _JAWS)
+    ax.add_patch(Rectangle(corner, 0.75, 2 * _JAWS, facecolor=PAPER, zorder=0.6, **ink))
+    wall, grip = float(_bore_radius(0.0)), _JAWS - 0.1
+    jaw = [(3.5, _PIPE), (4.3, _PIPE), (4.3, grip), (3.5, grip)]
+    cut = [(_EDGE, _ROUGH), (_EDGE, wall), (6.5, wall), (6.5, _PIPE), (3.5, _PIPE), (3.5, _ROUGH)]
+    for side in (1, -1):
+        for shape, fill in ((jaw, PAPER), (cut, STEEL)):
+            corners = np.array(shape) * (1, side) + (0, _LEVEL)
+            ax.add_patch(Polygon(corners, facecolor=fill, zorder=0.7, **ink))
+
+
+def _draw_boring_bar(ax: Axes) -> None:
+    """Bar with its piezo stack and the tool, whose edge is on the wall, and the ways they move."""
+    ink = {"edgecolor": INK, "linewidth": _LINE}
+    corner = (_EDGE - 0.2, _LEVEL - _ROD)
+    ax.add_patch(Rectangle(corner, 3.6, 2 * _ROD, facecolor=PLANT, zorder=1.5, **ink))
+    left, right, wall = _EDGE - 0.05, _EDGE + 0.45, _LEVEL + float(_bore_radius(0.0))
+    low, high = _LEVEL - 0.3, _LEVEL + 0.3
+    ax.add_patch(Rectangle((left, low), right - left, high - low, facecolor=FOCUS, zorder=2, **ink))
+    for y in np.linspace(low, high, 7)[1:-1]:
+        ax.plot([left, right], [y, y], color=INK, linewidth=0.8, linestyle="-", zorder=2)
+    tool = [(_EDGE, wall), (right - 0.1, wall - 0.12), (right, high), (left, high)]
+    ax.add_patch(Polygon(tool, facecolor="#6e6e6e", zorder=2.2, **ink))
+    _double_arrow(ax, (5.68, _LEVEL + 0.47), (5.68, wall - 0.05), 1.6)
+    ax.plot([10.25, 10.9], [_LEVEL, _LEVEL], color=INK, linewidth=2.2, linestyle="-")
+    _head(ax, (9.95, _LEVEL), (-1, 0), INK, scale=1.5)
+
+
+def _draw_boring_end(ax: Axes) -> None:
+    """Chuck, workpiece, bore and tool along the axis, the samples of a turn, and the angle."""
+    ink = {"edgecolor": INK, "linewidth": _LINE}
+    ax.add_patch(Circle(_END, _JAWS, facecolor=PAPER, zorder=0.5, **ink))
+    for middle in _TURNED + np.radians([60.0, 180.0, 300.0]):
+        along, across = _ahead(1.0, middle) - _END, _ahead(1.0, middle + np.pi / 2) - _END
+        corners = ((1.5, -0.3), (_JAWS - 0.1, -0.3), (_JAWS - 0.1, 0.3), (1.5, 0.3))
+        jaw = [along * reach + across * side + _END for reach, side in corners]
+        ax.add_patch(Polygon(jaw, facecolor=PAPER, zorder=0.6, **ink))
+    ax.add_patch(Circle(_END, _PIPE, facecolor=STEEL, zorder=0.7, **ink))
+    turn = np.linspace(0.0, 2 * np.pi, 361)
+    ax.add_patch(Polygon(_bored(turn), facecolor=PLANT, zorder=0.8, **ink))
+    ax.add_patch(Circle(_END, _ROUGH, facecolor=PAPER, zorder=0.8, edgecolor=INK, linewidth=0.8))
+    for at in _bored(_TURNED - 2 * np.pi * np.arange(_DOTS) / _DOTS):
+        ax.add_patch(Circle(at, 0.055, facecolor=INK, linewidth=0, zorder=2.5))
+    wall = float(_bore_radius(0.0))
+    tool = [(0.0, wall), (0.3, wall - 0.2), (0.3, 0.2), (0.0, 0.2)]  # cuts with its left face
+    ax.add_patch(Polygon(np.add(tool, _END), facecolor="#6e6e6e", zorder=2.2, **ink))
+    ax.add_patch(Circle(_END, _ROD, facecolor=PLANT, zorder=2.3, **ink))
+    thin = {"color": INK, "linewidth": 0.8, "zorder": 1}
+    mark = _ahead(np.array([_ROD, 2.75]), np.full(2, _TURNED))
+    ax.plot(*mark.T, linestyle=(0, (7, 2.5, 1.5, 2.5)), **thin)
+    ax.plot(*_ahead(np.array([wall, 2.75]), np.zeros(2)).T, linestyle="-", **thin)
+    ax.plot(*_ahead(2.5, np.linspace(0.0, 0.85 * _TURNED, 40)).T, linestyle="-", **thin)
+    step = np.array([np.cos(0.95 * _TURNED), -np.sin(0.95 * _TURNED)])
+    _head(ax, tuple(_ahead(2.5, _TURNED)), tuple(step), INK, scale=0.8)
+    _clockwise(ax, _END, _JAWS + 0.35, (42.0, -12.0))
+
+
+def _draw_boring_signals(ax: Axes, font: float) -> None:
+    """Encoder, computer, amplifier and the holder of the bar, and the wires between them."""
+    size = {"width": 2.4, "height": 1.3}
+    items = [
+        Block("encoder", "encoder", (1.15, _LEVEL), width=2.0, height=1.1, fill=FOCUS),
+        Block("computer", "computer", (5.0, 1.1), fill=FOCUS, **size),
+        Block("amplifier", "amplifier", (9.5, 1.1), **size),
+        Block("holder", "holder", (9.1, _LEVEL), width=1.7, height=1.8, fill=PLANT),
+        Node("input", (9.5, _LEVEL - 0.9)),  # on the underside of the holder
+        Node("sensor", (8.6, _LEVEL - 0.9)),
+    ]
+    wires = [
+        Wire("encoder", "computer", via=1.1),
+        Wire("computer", "amplifier", "$v(k)$"),
+        Wire("amplifier", "input"),
+        Wire("sensor", "computer", "position $y(k)$", via=2.55),
+    ]
+    by_name = _by_name(items)
+    routes = [_route(wire, by_name) for wire in wires]
+    _paint(ax, items[:4], wires, routes, _labels(items[:4], wires, routes), font)
+
+
+# --- samples at equal angles ---------------------------------------------------------------------
+
+_STRIP = (1.9, 15.1)  # left and right end of one period
+_ANGLES, _TIMES = 5.75, 3.95  # heights of the two axes
+_SPEEDS = (0.45, 1.4)  # heights of no speed and of the mean
+_STEPS = 16  # samples in the period
+_SWING = 0.5  # amplitude of the speed over its mean, larger than in practice
+
+
+def draw_periodic_sampling(ax: Axes) -> Axes:
+    """Draw one period of a sinusoidal speed: equal steps of the angle, unequal ones of time.
+
+    Lines join the steps on the axis of the angle to their instants on that of time, below which
+    is the speed.  Made for a figure of about 8 by 3.8 inches.
+    """
+    font = 1.08 * _fit(ax, (0.0, 0.2, 16.2, 7.9))
+    left, right = _STRIP
+    angle, time = _sampling_instants()
+    above, below = (left + (right - left) * share for share in (angle, time))
+    _draw_strip(ax, above, below)
+    _draw_strip_speed(ax, time)
+    gaps = np.diff(below)
+    short, long = int(np.argmin(gaps)), int(np.argmax(gaps))
+    for k in (short, long):
+        (a, b), (t, u) = above[k : k + 2], below[k : k + 2]
+        band = [(a, _ANGLES), (b, _ANGLES), (u, _TIMES), (t, _TIMES)]
+        ax.add_patch(Polygon(band, facecolor=FOCUS, linewidth=0, zorder=0.5))
+        _double_arrow(ax, (a, _ANGLES + 0.42), (b, _ANGLES + 0.42))
+        _double_arrow(ax, (t, _TIMES - 0.42), (u, _TIMES - 0.42))
+    _double_arrow(ax, (left, _ANGLES + 1.4), (right, _ANGLES + 1.4))
+    _annotate(ax, _strip_notes(above, below, short, long), font)
+    return ax
+
+
+def _strip_notes(above: np.ndarray, below: np.ndarray, short: int, long: int) -> list[_Note]:
+    """The words on the strip; `short` and `long` are the steps whose lengths are named."""
+    left, right = _STRIP
+    period = "one period of the speed, $N$ samples"
+    mean = _SPEEDS[1]
+    counts = [(above[0], "$k=0$"), (above[1], "1"), (above[2], "2"), (above[-1], "$N$")]
+    labels = [_Label(x, _ANGLES + 0.5, text) for x, text in counts]
+    labels += [
+        _Label((left + right) / 2, _ANGLES + 1.75, period),
+        _Label(above[short : short + 2].mean(), _ANGLES + 0.85, r"$\Delta\theta$"),
+        _Label(above[long : long + 2].mean(), _ANGLES + 0.85, r"$\Delta\theta$"),
+        _Label(below[short : short + 2].mean(), _TIMES - 0.85, "short $T(k)$"),
+        _Label(below[long : long + 2].mean(), _TIMES - 0.85, "long $T(k)$"),
+        _Label(0.1, _ANGLES, "angle", "left"),
+        _Label(right + 0.75, _ANGLES, r"$\theta$"),
+        _Label(0.1, _TIMES, "time", "left"),
+        _Label(right + 0.75, _TIMES, "$t$"),
+        _Label(0.1, mean + 0.6, r"speed $\omega$", "left"),
+        _Label(right + 0.75, _SPEEDS[0], "$t$"),
+        _Label(left - 0.3, mean, r"$\omega_0$", "right"),
+        _Label(left - 0.3, _SPEEDS[0], "0", "right"),
+    ]
+    return [(label, None) for label in labels]
+
+
+def _sampling_instants() -> tuple[np.ndarray, np.ndarray]:
+    """Equal steps of the angle and their instants, from 0 to 1 in a period, both included."""
+    time = np.linspace(0.0, 1.0, 2001)
+    turned = time + _SWING * (1 - np.cos(2 * np.pi * time)) / (2 * np.pi)
+    angle = np.linspace(0.0, 1.0, _STEPS + 1)
+    return angle, np.interp(angle, turned, time)
+
+
+def _draw_strip(ax: Axes, above: np.ndarray, below: np.ndarray) -> None:
+    """The axes of angle and time with their steps, and the lines that join these."""
+    left, right = _STRIP
+    for height in (_ANGLES, _TIMES):
+        _draw_wire(ax, [(left - 0.25, height), (right + 0.55, height)], INK, arrow=True)
+    for a, t in zip(above, below, strict=True):
+        ax.plot([a, t], [_ANGLES, _TIMES], color=INK, linewidth=0.8, linestyle="-", zorder=2)
+        for x, height, end in ((a, _ANGLES, 0.24), (t, _TIMES, -0.24)):
+            tick = {"linewidth": 1.6, "linestyle": "-", "zorder": 3}
+            ax.plot([x, x], [height, height + end], color=INK, **tick)
+
+
+def _draw_strip_speed(ax: Axes, samples: np.ndarray) -> None:
+    """The speed over one period with its mean, and its samples as stems."""
+    (left, right), (zero, mean) = _STRIP, _SPEEDS
+    _draw_wire(ax, [(left - 0.25, zero), (right + 0.55, zero)], INK, arrow=True)
+    dashes = {"color": "#8a8a8a", "linewidth": 0.8, "linestyle": (0, (4, 3))}
+    ax.plot([left - 0.2, right], [mean, mean], **dashes)
+
+    def height(time: np.ndarray) -> np.ndarray:
+        return mean + (mean - zero) * _SWING * np.sin(2 * np.pi * time)
+
+    time = np.linspace(0.0, 1.0, 361)
+    curve = {"color": INK, "linewidth": 1.6, "linestyle": "-", "zorder": 3}
+    ax.plot(left + (right - left) * time, height(time), **curve)
+    for x, y in zip(left + (right - left) * samples, height(samples), strict=True):
+        ax.plot([x, x], [zero, y], color=INK, linewidth=0.8, linestyle="-", zorder=2)
+        ax.add_patch(Circle((x, y), _DOT, facecolor=INK, linewidth=0, zorder=4))
+
+
+# --- regenerative chatter ------------------------------------------------------------------------
+
+_TIP = 6.2  # where the tool's edge is along the cut
+_MEAN_CUT, _MEAN_CHIP = 2.15, 1.15  # mean height of the cut surface, and h0
+_WAVE, _CREST = 3.2, 0.4  # length and amplitude of the chatter marks, exaggerated
+_LAG = np.radians(75.0)  # by which the wave being cut is behind that of the last turn
+_CUT_PIECE = (0.5, 15.2, 0.3)  # left end, right end and bottom of the workpiece
+_MASS = (6.75, 5.35, 2.3, 1.15)  # centre, width and height
+
+
+def draw_regeneration(ax: Axes) -> Axes:
+    """Draw regenerative chatter: a tool on a spring cuts the wave that it left one turn ago.
+
+    The surface is unrolled and moves to the right; on its right is what the tool has just cut.
+    Made for a figure of about 8 by 4.2 inches; the chatter marks are exaggerated.
+    """
+    font = 1.08 * _fit(ax, (0.2, 0.2, 16.4, 8.5))
+    _draw_chatter_marks(ax)
+    _draw_chatter_lengths(ax)
+    _draw_chatter_tool(ax, font)
+    _annotate(ax, _chatter_notes(), font)
+    return ax
+
+
+def _chatter_notes() -> list[_Note]:
+    """The words on the picture, and the line from a word to what it names."""
+    old, cut = _TIP - 1.55 * _WAVE, _TIP + 2.3 * _WAVE
+    turn = _Label(0.5, 5.0, "left one turn ago,\n" + r"$x(t-\tau)$", "left", color=DISTURBED)
+    now = _Label(11.4, 0.85, "being cut, $x(t)$", "left")
+    thickness = "chip thickness\n" + r"$h(t)=h_0+x(t-\tau)-x(t)$"
+    x, y, width, height = _MASS
+    shifted = _TIP + _WAVE * (1 - _LAG / (4 * np.pi))
+    return [
+        (turn, ((1.5, 4.4), (old, float(_last_surface(old))))),
+        (now, ((cut, 1.15), (cut, float(_cut_surface(cut))))),
+        (_Label(10.0, 7.2, thickness, "left"), None),
+        (_Label(10.0, 6.05, r"cutting force $K\,h(t)$", "left"), None),
+        (_Label(x, y, "mass $m$"), None),
+        (_Label(x - 1.0, y + height / 2 + 0.85, "$k$", "right"), None),
+        (_Label(x + 1.05, y + height / 2 + 0.85, "$c$", "left"), None),
+        (_Label(x - width / 2 - 0.75, y + 0.35, "$x$", "right"), None),
+        (_Label(shifted - 0.35, 4.78, "phase shift", "left"), None),
+        (_Label(_TIP - 0.55, _MEAN_CUT + 0.72, "$h(t)$"), None),
+        (_Label(_TIP + 3.7, _MEAN_CUT + 0.57, "chip"), None),
+        (_Label(_TIP + 1.25, 4.1, "tool", "left"), None),
+        (_Label(15.5, _MEAN_CUT + _MEAN_CHIP / 2, "$h_0$", "left"), None),
+        (_Label(0.8, 0.85, "workpiece", "left"), None),
+    ]
+
+
+def _cut_surface(x: np.ndarray | float) -> np.ndarray:
+    """Height that the tool leaves, which rises now as it moves to the left."""
+    return _MEAN_CUT + _CREST * np.cos(2 * np.pi * (np.asarray(x) - _TIP) / _WAVE + _LAG)
+
+
+def _last_surface(x: np.ndarray | float) -> np.ndarray:
+    """Height left one turn ago; the tool is at one of its crests."""
+    return _MEAN_CUT + _MEAN_CHIP + _CREST * np.cos(2 * np.pi * (np.asarray(x) - _TIP) / _WAVE)
+
+
+def _draw_chatter_marks(ax: Axes) -> None:
+    """Workpiece with both surfaces, the layer between them that is gone, and how it moves."""
+    left, right, bottom = _CUT_PIECE
+    ahead, behind = np.linspace(left, _TIP, 400), np.linspace(_TIP, right, 600)
+    old, cut, gone = _last_surface(ahead), _cut_surface(behind), _last_surface(behind)
+    layer = [*zip(behind, cut, strict=True), *zip(behind[::-1], gone[::-1], strict=True)]
+    ax.add_patch(Polygon(layer, facecolor=FOCUS, linewidth=0, zorder=0.5))
+    surface = [*zip(ahead, old, strict=True), *zip(behind, cut, strict=True)]
+    body = [(left, bottom), *surface, (right, bottom)]
+    ax.add_patch(Polygon(body, facecolor=PLANT, edgecolor=INK, linewidth=_LINE, zorder=0.6))
+    ax.plot(ahead, old, color=DISTURBED, linewidth=2.2, linestyle="-")
+    ax.plot(behind, gone, color=DISTURBED, linewidth=1.6, linestyle=(0, (4, 2)))
+    ax.plot(behind, cut, color=INK, linewidth=2.2, linestyle="-")
+    ax.plot([3.4, 5.0], [0.85, 0.85], color=INK, linewidth=2.2, linestyle="-")
+    _head(ax, (5.3, 0.85), (1, 0), INK, scale=1.5)
+
+
+def _draw_chatter_lengths(ax: Axes) -> None:
+    """Chip thickness at the tool and on average, and the shift between the two waves."""
+    thin = {"color": INK, "linewidth": 0.8, "linestyle": "-"}
+    tip, crest = float(_cut_surface(_TIP)), float(_last_surface(_TIP))
+    at = _TIP - 1.15
+    ax.plot([at - 0.2, _TIP], [tip, tip], **thin)
+    ax.plot([at - 0.2, _TIP], [crest, crest], **thin)
+    _double_arrow(ax, (at, tip), (at, crest))
+    right = _CUT_PIECE[1]
+    for height in (_MEAN_CUT, _MEAN_CUT + _MEAN_CHIP):
+        dashes = {"color": "#6a6a6a", "linewidth": 0.8, "linestyle": (0, (7, 2.5, 1.5, 2.5))}
+        ax.plot([_TIP + 1.6, right + 0.3], [height, height], **dashes)
+    _double_arrow(ax, (right + 0.15, _MEAN_CUT), (right + 0.15, _MEAN_CUT + _MEAN_CHIP))
+    old = _TIP + _WAVE
+    cut = old - _WAVE * _LAG / (2 * np.pi)
+    for x, surface in ((old, _last_surface), (cut, _cut_surface)):
+        ax.plot([x, x], [float(surface(x)), 4.5], **thin)
+    _double_arrow(ax, (cut, 4.3), (old, 4.3))
+
+
+def _draw_chatter_tool(ax: Axes, font: float) -> None:
+    """Tool and mass on spring and damper, the frame that holds them, and the sense of x."""
+    ink = {"edgecolor": INK, "linewidth": _LINE}
+    x, y, width, height = _MASS
+    tip = (_TIP, float(_cut_surface(_TIP)))
+    low, high, roof = y - height / 2, y + height / 2, 7.7
+    shank = [tip, (_TIP + 0.1, low), (_TIP + 1.1, low), (_TIP + 0.95, tip[1] + 0.75)]
+    ax.add_patch(Polygon(shank, facecolor="#6e6e6e", zorder=2.5, **ink))
+    _paint(ax, [Block("mass", "", (x, y), width, height, PAPER)], [], [], [], font)
+    ax.add_patch(
+        Rectangle((x - 1.5, roof), 3.0, 0.35, facecolor=PAPER, hatch="////", zorder=2, **ink)
+    )
+    _draw_spring(ax, x - 0.6, high, roof)
+    _draw_damper(ax, x + 0.6, high, roof)
+    side = x - width / 2
+    ax.plot([side - 0.75, side - 0.15], [y, y], color=INK, linewidth=0.8, linestyle="-")
+    _draw_wire(ax, [(side - 0.45, y), (side - 0.45, y + 1.0)], INK, arrow=True)
+
+
+def _draw_spring(ax: Axes, x: float, low: float, high: float) -> None:
+    """A vertical spring with straight ends."""
+    reach = np.linspace(0.18, 0.82, 14)
+    side = 0.2 * np.array([0, *np.resize([1, -1], 12), 0])
+    points = [(x, low), *zip(x + side, low + (high - low) * reach, strict=True), (x, high)]
+    ax.plot(*zip(*points, strict=True), color=INK, linewidth=_LINE, linestyle="-", zorder=2)
+
+
+def _draw_damper(ax: Axes, x: float, low: float, high: float) -> None:
+    """A vertical dashpot: a cup below, and a piston that hangs in it."""
+    line = {"color": INK, "linewidth": _LINE, "linestyle": "-", "zorder": 2}
+    floor, rim, piston = (low + (high - low) * share for share in (0.3, 0.68, 0.5))
+    ax.plot([x, x], [low, floor], **line)
+    ax.plot([x - 0.24, x - 0.24, x + 0.24, x + 0.24], [rim, floor, floor, rim], **line)
+    ax.plot([x, x], [piston, high], **line)
+    ax.plot([x - 0.18, x + 0.18], [piston, piston], color=INK, linewidth=2.6, linestyle="-")
 
 
 # --- the layout of loops -------------------------------------------------------------------------

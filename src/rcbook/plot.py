@@ -195,3 +195,54 @@ def draw_cutter_chips(
 def _clock(radius: ArrayLike, angle: ArrayLike) -> np.ndarray:
     """Points at angles clockwise from the top, coordinates on the first axis."""
     return np.stack(np.broadcast_arrays(radius * np.sin(angle), radius * np.cos(angle)))
+
+
+def draw_bore(
+    ax: Axes,
+    angle: ArrayLike,
+    desired: ArrayLike,
+    error: ArrayLike,
+    magnified: float = 1.0,
+    label: str = "",
+    reach: float | None = None,
+    **line,
+) -> Axes:
+    """The wall of a bore about its nominal circle (`ax` is polar), as a roundness chart shows it.
+
+    `desired` is the deviation from the dashed circle, `error` what the cut lacks of it, magnified
+    once more; all in m, drawn in µm.  Angles in rad run anticlockwise from the top, over one turn
+    or several.  Drawings with the same `reach`, the largest deviation with room, share their scale.
+    """
+    angle, desired = np.asarray(angle, dtype=float), 1e6 * np.asarray(desired, dtype=float)
+    cut = desired - magnified * 1e6 * np.asarray(error, dtype=float)
+    largest = 1.2 * np.abs([desired, cut]).max() if reach is None else 1e6 * reach
+    if ax.lines:  # another cut of the same bore
+        largest = max(largest, ax.get_rmax())
+    else:
+        ring = max(s * 10.0**n for n in range(-4, 5) for s in (1, 2, 5) if s * 10.0**n < largest)
+        _draw_bore_frame(ax, ring, magnified)
+        broad = {"color": "0.75", "linewidth": 4.5, "linestyle": "-", "zorder": 2}
+        ax.plot(_closed(angle), _closed(desired), label="desired", **broad)
+        ax.set_prop_cycle(None)  # so that the cut has the first colour
+    ax.plot(_closed(angle), _closed(cut), label=label or None, **{"linewidth": 1.1, **line})
+    ax.set_rlim(-largest, largest)
+    ax.set_rorigin(-3 * largest)  # the bore itself is far larger
+    return ax
+
+
+def _draw_bore_frame(ax: Axes, ring: float, magnified: float) -> None:
+    """Nominal circle, a ring on either side of it, and in the middle how far these are, in µm."""
+    turn = np.linspace(0, 2 * np.pi, 361)
+    ax.plot(turn, 0 * turn, color="0.35", linewidth=0.9, linestyle=(0, (4, 3)), zorder=1.5)
+    words = f"rings\n±{ring:g} µm" + (f"\nerror {magnified:g}×" if magnified != 1 else "")
+    ax.text(0.5, 0.5, words, ha="center", va="center", transform=ax.transAxes)
+    ax.set_theta_zero_location("N")
+    ax.set_xticks(np.pi / 2 * np.arange(4), ["0°", "90°", "180°", "270°"])
+    ax.set_yticks([-ring, ring], [])
+    ax.spines["polar"].set_visible(False)
+    ax.spines["inner"].set_linewidth(0)  # drawing makes it visible again
+
+
+def _closed(values: np.ndarray) -> np.ndarray:
+    """The values and the first one again."""
+    return np.append(values, values[0])

@@ -1,0 +1,69 @@
+"""Three ways to the one-period matrix, and verdicts at long periods, as ratios of one run.
+
+Run it with `python benchmarks/bench_periodic.py`; it asserts nothing about time.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from rcbook import periodic
+from rcbook.machines.boring_bar import HANSON_TSAO2000, sinusoidal_intervals
+
+ROUTES = {
+    "product of eq. 10": periodic.product_of_matrices,
+    "appendix": periodic.lifted,
+    "recursion": periodic.dense,
+}
+
+
+def scheduled(n: int, gamma: float = 0.3) -> periodic.PeriodicLoop:
+    """The gain-scheduled design on the boring bar."""
+    bar = HANSON_TSAO2000
+    intervals = sinusoidal_intervals(bar.sampling_interval, gamma, n)
+    plant = periodic.sample(bar.plant, intervals)
+    return periodic.PeriodicLoop(plant, periodic.zero_phase(bar.plant, intervals))
+
+
+def seconds(call: Callable[[], object], least: float = 0.1) -> float:
+    """Best time of one call, repeated until `least` seconds have gone by."""
+    best, spent = np.inf, 0.0
+    while best == np.inf or spent < least:
+        start = time.perf_counter()
+        call()
+        took = time.perf_counter() - start
+        best, spent = min(best, took), spent + took
+    return best
+
+
+def routes() -> None:
+    """Time to form the matrix, relative to the appendix at the same period."""
+    print("forming the one-period matrix, relative to the appendix")
+    print(f"{'N':>6}" + "".join(f"{name:>20}" for name in ROUTES))
+    for n in (16, 32, 64, 128, 256):
+        loop = scheduled(n)
+        times = {
+            name: seconds(lambda way=way, loop=loop: way(loop)) for name, way in ROUTES.items()
+        }
+        print(f"{n:6d}" + "".join(f"{t / times['appendix']:20.2f}" for t in times.values()))
+
+
+def verdicts() -> None:
+    """Time of a verdict, relative to one application of the one-period map."""
+    print("\none verdict, in applications of the one-period map")
+    for n in (128, 512, 2048):
+        loop = scheduled(n)
+        once = periodic.one_period_map(loop)
+        state = np.ones(once.shape[0])
+        each = seconds(lambda once=once, state=state: once @ state)
+        energy = seconds(lambda loop=loop: periodic.decide(loop))
+        counted = seconds(lambda loop=loop: periodic.count_outside(loop))
+        print(f"{n:6d}: by energy {energy / each:8.0f}, by counting {counted / each:8.0f}")
+
+
+if __name__ == "__main__":
+    routes()
+    verdicts()
