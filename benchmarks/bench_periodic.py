@@ -5,10 +5,8 @@ Run it with `python benchmarks/bench_periodic.py`; it asserts nothing about time
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-
 import numpy as np
+from timing import seconds
 
 from rcbook import periodic
 from rcbook.machines.boring_bar import HANSON_TSAO2000, sinusoidal_intervals
@@ -26,17 +24,6 @@ def scheduled(n: int, gamma: float = 0.3) -> periodic.PeriodicLoop:
     intervals = sinusoidal_intervals(bar.sampling_interval, gamma, n)
     plant = periodic.sample(bar.plant, intervals)
     return periodic.PeriodicLoop(plant, periodic.zero_phase(bar.plant, intervals))
-
-
-def seconds(call: Callable[[], object], least: float = 0.1) -> float:
-    """Best time of one call, repeated until `least` seconds have gone by."""
-    best, spent = np.inf, 0.0
-    while best == np.inf or spent < least:
-        start = time.perf_counter()
-        call()
-        took = time.perf_counter() - start
-        best, spent = min(best, took), spent + took
-    return best
 
 
 def routes() -> None:

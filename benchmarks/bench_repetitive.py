@@ -5,12 +5,11 @@ Run it with `python benchmarks/bench_repetitive.py`; it asserts nothing about ti
 
 from __future__ import annotations
 
-import time
 import warnings
-from collections.abc import Callable
 
 import control
 import numpy as np
+from timing import seconds
 
 from rcbook import repetitive
 from rcbook.machines.peripheral_mill import HORNG1989
@@ -39,17 +38,6 @@ def closed_loop(loop: repetitive.Loop) -> control.StateSpace:
     return control.feedback(
         block(path.numerator, path.a) * block(repeat.numerator, repeat.denominator)
     )
-
-
-def seconds(call: Callable[[], object], least: float = 0.2) -> float:
-    """Best time of one call, repeated until `least` seconds have gone by."""
-    best, spent = np.inf, 0.0
-    while best == np.inf or spent < least:
-        start = time.perf_counter()
-        call()
-        took = time.perf_counter() - start
-        best, spent = min(best, took), spent + took
-    return best
 
 
 def responses() -> None:
