@@ -1125,7 +1125,8 @@ BAD = {
     "model of power": (lambda: face_mill.control_model(MILL, output="power"), r"output 'power'"),
     "response with another torque": (lambda: face_mill.frequency_response(MILL, 1j, "clamp"),
         r"torque 'clamp' is none of memory, instantaneous, none"),
-    "response at one": (lambda: face_mill.frequency_response(MILL, [1j, 1]), r"not z = 1"),
+    "response off the circle": (lambda: face_mill.frequency_response(MILL, [1j, 0.5j]),
+        r"leaves the unit circle"),
     "circle of one tooth": (lambda: face_mill.eccentric_runout(1, 1e-6), r"teeth = 1 .*below 2"),
     "NaN eccentricity": (lambda: face_mill.eccentric_runout(8, NAN), r"eccentricity = nan"),
     "NaN phase": (lambda: face_mill.eccentric_runout(8, 1e-6, NAN), r"phase = nan"),
@@ -1151,3 +1152,13 @@ def test_whole_numbers_and_arrays_are_taken_in_any_dress():
     assert dressed == MILL and hash(dressed) == hash(MILL)
     assert type(dressed.runout[0]) is float and type(dressed.teeth) is int
     assert Experiment(MILL, turns=np.int64(3)).turns == 3
+
+
+@pytest.mark.parametrize("torque, feedback", [("instantaneous", True), ("none", False)])
+def test_the_response_at_one_is_the_steady_gain_of_the_sampled_model(torque, feedback):
+    plant = face_mill.control_model(MILL, feedback)
+    steady = plant.b.sum() / plant.a.sum()
+    found = face_mill.frequency_response(MILL, [1.0], torque)[0]
+    assert found == pytest.approx(steady, rel=1e-9)
+    other = face_mill.frequency_response(replace(MILL, depth=1.01 * MILL.depth), [1.0], torque)[0]
+    assert other != pytest.approx(steady, rel=1e-3)

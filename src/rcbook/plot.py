@@ -73,12 +73,7 @@ def draw_unit_circle(ax: Axes) -> Axes:
     """The unit circle of the z plane with its axes, equal scales."""
     angle = np.linspace(0, 2 * np.pi, 361)
     ax.plot(np.cos(angle), np.sin(angle), color=GREY, linewidth=1, linestyle="-")
-    ax.axhline(0, color="0.8", linewidth=0.8, linestyle="-", zorder=0)
-    ax.axvline(0, color="0.8", linewidth=0.8, linestyle="-", zorder=0)
-    ax.set_aspect("equal")
-    ax.set_xlabel("real part of $z$")
-    ax.set_ylabel("imaginary part of $z$")
-    return ax
+    return _complex_plane(ax, " of $z$")
 
 
 def draw_poles_zeros(ax: Axes, plant: Plant, label: str = "", color: str = "black") -> Axes:
@@ -101,11 +96,15 @@ def draw_locus(ax: Axes, loci: ArrayLike, label: str = "") -> Axes:
 def draw_unit_disc(ax: Axes) -> Axes:
     """The disc of radius one about 1, inside which G H must lie for passes to contract."""
     ax.add_patch(plt.Circle((1, 0), 1, facecolor="0.93", edgecolor=GREY, zorder=0))
+    return _complex_plane(ax)
+
+
+def _complex_plane(ax: Axes, of: str = "") -> Axes:
     ax.axhline(0, color="0.8", linewidth=0.8, linestyle="-", zorder=0)
     ax.axvline(0, color="0.8", linewidth=0.8, linestyle="-", zorder=0)
     ax.set_aspect("equal")
-    ax.set_xlabel("real part")
-    ax.set_ylabel("imaginary part")
+    ax.set_xlabel(f"real part{of}")
+    ax.set_ylabel(f"imaginary part{of}")
     return ax
 
 

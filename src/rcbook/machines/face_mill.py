@@ -109,6 +109,11 @@ class FaceMill:
         """G_d, slope of the torque of infinitely many teeth over the speed, N m s/rad (eq. 14)."""
         return -self.nominal_torque / self.speed
 
+    @property
+    def force_slope(self) -> float:
+        """Slope of the peak force over the speed per angle of pitch, N s/rad2 (eq. 17)."""
+        return -self.cutting_coefficient * self.depth * self.feed_speed / self.speed**2
+
 
 EIGHT_TEETH = FaceMill(  # default conditions
     drive=TSAO_PONG1991,
@@ -160,9 +165,7 @@ def control_model(mill: FaceMill, torque_feedback: bool = True, output: str = "f
     slope = mill.torque_slope if torque_feedback else 0.0
     driven = spindle_drive.in_angle(spindle_drive.speed_driven(mill.drive, slope), mill.speed)
     turned = zdomain.interval_integral(driven["speed", "command"], sampling_angle(mill))
-    gain = -mill.cutting_coefficient * mill.depth * mill.feed_speed / mill.speed**2
-    if output == "torque":
-        gain = mill.torque_slope / mill.pitch
+    gain = mill.force_slope if output == "force" else mill.torque_slope / mill.pitch
     moving_sum = np.ones(mill.samples_per_pitch)
     return Plant(gain * multiply(turned.b, moving_sum), turned.a, turned.delay, turned.dt)
 
@@ -175,20 +178,18 @@ def frequency_response(
     It is that of the continuous machine behind its hold, summed over the aliases, and so holds for
     a torque that a sampled model of finite order cannot have: with the "memory" of eq. 8 averaged
     over the teeth, as well as "instantaneous" (eq. 14) and "none".
-    Raises ValueError for another torque, for points off the circle and for z = 1 itself, where it
-    is a limit.
+    Raises ValueError for another torque and for points off the circle.
     """
     _one_of(torque, (*TORQUES, "none"), "torque")
     aliases = whole_number(aliases, "aliases", 1)
     step, z = sampling_angle(mill), np.asarray(z, dtype=complex)
-    if not np.all(np.abs(np.abs(z) - 1) < 1e-9) or np.any(z == 1):
-        raise ValueError("give points of the unit circle, and not z = 1, which is a limit")
+    if not np.all(np.abs(np.abs(z) - 1) < 1e-9):
+        raise ValueError(f"z = {z} leaves the unit circle, where the response is; stay on it")
     turn = np.angle(z)[..., None] + 2 * np.pi * np.arange(-aliases, aliases + 1)
     sigma = 1j * turn / step
-    hold, memory = ((1 - np.exp(-sigma * span)) / (sigma * span) for span in (step, mill.pitch))
     speed = _speed_response(mill, sigma, "command") / _cut_alone(mill, sigma, torque)
-    gain = -mill.cutting_coefficient * mill.depth * mill.feed_speed / mill.speed**2
-    return np.sum(hold * gain * mill.pitch * memory * speed, axis=-1)
+    hold, memory = zdomain.phi1(-sigma * step), zdomain.phi1(-sigma * mill.pitch)
+    return mill.force_slope * mill.pitch * np.sum(hold * memory * speed, axis=-1)
 
 
 def is_stable(mill: FaceMill, torque: str = "memory") -> bool:
@@ -207,7 +208,7 @@ def is_stable(mill: FaceMill, torque: str = "memory") -> bool:
 
 def _cut_alone(mill: FaceMill, sigma: np.ndarray, torque: str) -> np.ndarray:
     """1 - (drive from torque to speed)(slope of the torque over the speed), without aliases."""
-    memory = (1 - np.exp(-sigma * mill.pitch)) / (sigma * mill.pitch)
+    memory = zdomain.phi1(-sigma * mill.pitch)
     slope = {"memory": mill.torque_slope * memory, "instantaneous": mill.torque_slope, "none": 0}
     return 1 - _speed_response(mill, sigma, "load") * slope[torque]
 
