@@ -32,8 +32,10 @@ ERRATA = {
     "eq2": {"where": "eq. 2", "printed": "$p$", "corrected": "$-p$", "why": "a sign"},
     "pen": {"where": "p. 3", "printed": "runnout", "corrected": "runout", "why": "spelling"},
 }
-PAPER = Paper("fake", "A fake case", "Nobody, Nowhere, 1989.", "one.ipynb",
-              {"primary": "as printed"}, ERRATA, {claim.id: claim for claim in CLAIMS})
+PAPER = Paper("fake", "The case one", "Nobody, Nowhere, 1989.", "one.ipynb", 1,
+              {"loop": "a loop", "index": "time", "period": "a turn"},
+              {"primary": {"title": "The plain reading", "text": "as printed"}}, ERRATA, {},
+              {claim.id: claim for claim in CLAIMS})
 ledger = Ledger(PAPER)
 """
 LEDGER = """from fake_paper import ledger

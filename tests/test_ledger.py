@@ -235,11 +235,20 @@ GOOD = """
 title = "A title"
 citation = "A. Author, A Paper"
 notebook = "paper.ipynb"
+chapter = 1
+[idea]
+loop = "one"
+index = "time"
+period = "a turn"
 [conventions]
-primary = "as printed"
-cut = "digits are cut"
+primary = { title = "Plain", text = "as printed" }
+cut = { title = "Cut", text = "digits are cut" }
 [errata.eq25]
 where = "eq. 25"
+[changes.gain]
+what = "the gain"
+sizes = [0.01, 0.1]
+apply = "pass"
 [[claims]]
 id = "paper.a"
 where = "eq. 1"
@@ -248,6 +257,8 @@ says = "pole"
 printed = "0.84"
 unit = ""
 expected = "reproduced"
+role = "headline"
+flips_under = "gain"
 [[claims]]
 id = "paper.b"
 where = "fig. <2>"
@@ -256,6 +267,7 @@ says = "time & <b>place</b>"
 printed = "0.6"
 unit = "s"
 expected = "not reproduced"
+role = "result"
 reason = "it takes {value:.2f} s"
 """
 

@@ -46,6 +46,11 @@ def _parser() -> argparse.ArgumentParser:
     build.set_defaults(run=_build)
     check = commands.add_parser("check", help="execute and judge; exit 1 when a verdict flips")
     check.set_defaults(run=_check)
+    falsify = commands.add_parser("falsify", help="change the model and see each verdict flip")
+    falsify.add_argument("--paper", metavar="KEY", help="only this paper, such as horng1989")
+    falsify.add_argument("--change", metavar="NAME", help="only this change of the paper")
+    falsify.add_argument("--measure", action="store_true", help="at all sizes; store the margins")
+    falsify.set_defaults(run=_falsify)
     show = commands.add_parser("ledger", help="print the ledger of the last run")
     show.add_argument("--json", action="store_true", help="as a list of objects")
     show.add_argument("--paper", metavar="KEY", help="only this paper, such as horng1989")
@@ -76,6 +81,39 @@ def _build(_) -> int:
         print(f"rcbook: {error}", file=sys.stderr)
         return FAILED
     return OK
+
+
+def _falsify(arguments: argparse.Namespace) -> int:
+    from rcbook import falsify, ledger
+    from rcbook.project import find
+
+    project = find(Path.cwd())
+    keys = (arguments.paper,) if arguments.paper else ledger.papers()
+    problems = shown = 0
+    for paper in map(ledger.load, keys):
+        names = [arguments.change] if arguments.change else list(paper.changes)
+        wanted = [
+            (name, size)
+            for name in names
+            for size in falsify.sizes(paper.changes.get(name, {}))[0 if arguments.measure else -1 :]
+        ]
+        tried = falsify.trials(paper, project.notebooks, wanted)
+        for trial in tried:
+            expected = {id: claim.expected for id, claim in paper.claims.items()}
+            turned = [id for id, verdict in trial.verdicts.items() if verdict != expected[id]]
+            print(f"{paper.key}: {trial.change} {trial.size or ''} turns {len(turned)} verdicts")
+            print("".join(f"    {id}\n" for id in turned), end="")
+            print("".join(f"    failed: {trouble}\n" for trouble in trial.troubles), end="")
+        if arguments.change:
+            continue
+        lacking = falsify.unflipped(paper, tried)
+        print("".join(f"UNFLIPPED {problem}\n" for problem in lacking), end="")
+        problems += len(lacking)
+        shown += sum(claim.role in ledger.SCORED for claim in paper.claims.values())
+        if arguments.measure:
+            falsify.store(paper, falsify.margins(paper, tried))
+    print(f"{shown} scored claims, {problems} not shown to be falsifiable")
+    return FAILED if problems else OK
 
 
 def _ledger(arguments: argparse.Namespace) -> int:

@@ -30,6 +30,8 @@ NOT_REPRODUCED = "not reproduced"
 NOT_COMPUTABLE = "not computable"
 VERDICTS = (REPRODUCED, CORRECTED, NOT_REPRODUCED, NOT_COMPUTABLE)
 KINDS = ("number", "list", "bound", "statement", "measurement")
+SCORED = ("headline", "result")
+ROLES = (*SCORED, "input", "identity")
 
 _ROUNDING = 1e-12  # of a value that lies on the end of an interval
 _LONG = 8  # a longer list is shown by its ends
@@ -53,7 +55,10 @@ class Claim:
     printed: str
     unit: str
     expected: str
-    tolerance: float | None = None  # in the claim's unit; None: half a unit of the last digit
+    role: str = "result"  # one of ROLES; every claim of a file states it
+    flips_under: str = ""  # key of the paper's changes: the change that turns the verdict
+    word: str = ""  # the unsharp word of the print that `words.toml` makes sharp
+    tolerance: float | None = None  # in the claim's unit; None: by the word, or half a digit
     tolerance_reason: str = ""
     convention: str = "primary"  # key of the paper's conventions
     erratum: str = ""  # key of the paper's errata
@@ -66,12 +71,26 @@ class Paper:
     """Everything `papers/KEY.toml` says about one paper."""
 
     key: str
-    title: str
+    title: str  # that of the chapter
     citation: str
     notebook: str
-    conventions: Mapping[str, str]
+    chapter: int  # its place in the order of reading
+    idea: Mapping[str, str]  # its row in the table of the one idea: loop, index, period
+    conventions: Mapping[str, Mapping[str, str]]  # each a `title` and a `text`
     errata: Mapping[str, Mapping[str, str]]
+    changes: Mapping[str, Mapping]  # of the model, which turn verdicts; see `falsify`
     claims: Mapping[str, Claim]
+    margins: Mapping[str, Mapping] = field(default_factory=dict)  # as `falsify` measured them
+
+
+@dataclass(frozen=True)
+class Word:
+    """What an unsharp word means: a `relative` size or factor, an `absolute` one, or a rule."""
+
+    words: Sequence[str]
+    means: str
+    value: float | None = None
+    absolute: float | None = None
 
 
 @dataclass(frozen=True)
@@ -117,10 +136,35 @@ def _last_digit(printed: str) -> int:
     return exponent
 
 
+def words() -> dict[str, Word]:
+    """The table of unsharp words, by the key of each row."""
+    text = resources.files("rcbook").joinpath("words.toml").read_text(encoding="utf-8")
+    return {key: Word(**row) for key, row in tomllib.loads(text).items()}
+
+
+WORDS = words()
+_ROWS = {name: row for row in WORDS.values() for name in row.words}
+
+
+def word(name: str) -> float:
+    """The fraction or factor that `name`, such as `'slight'`, means in every paper.
+
+    Raises ValueError for a word that the table does not have or that names a rule.
+    """
+    row = _ROWS.get(name)
+    value = None if row is None else row.absolute if row.value is None else row.value
+    if value is None:
+        known = ", ".join(n for n, r in _ROWS.items() if (r.value or r.absolute) is not None)
+        raise ValueError(f"no number is declared for the word {name!r}; choose one of {known}")
+    return value
+
+
 def papers() -> tuple[str, ...]:
-    """Keys of all papers in the package, sorted."""
+    """Keys of all papers in the package, in the order of their chapters."""
     files = resources.files("rcbook").joinpath("papers").iterdir()
-    return tuple(sorted(f.name.removesuffix(".toml") for f in files if f.name.endswith(".toml")))
+    found = {f.name.removesuffix(".toml"): f for f in files if f.name.endswith(".toml")}
+    chapters = {key: tomllib.loads(f.read_text(encoding="utf-8")) for key, f in found.items()}
+    return tuple(sorted(found, key=lambda key: (chapters[key].get("chapter", 0), key)))
 
 
 def load(key: str) -> Paper:
@@ -134,7 +178,7 @@ def load(key: str) -> Paper:
     if not source.is_file():
         raise ValueError(f"no paper {key!r}; choose one of {', '.join(papers())}")
     data = tomllib.loads(source.read_text(encoding="utf-8"))
-    parts = ("title", "citation", "notebook", "conventions", "errata", "claims")
+    parts = [f.name for f in fields(Paper) if f.name not in ("key", "margins")]
     if absent := [part for part in parts if part not in data]:
         raise ValueError(f"{key}.toml lacks {', '.join(absent)}; add them")
     claims: dict[str, Claim] = {}
@@ -142,13 +186,17 @@ def load(key: str) -> Paper:
         claim = _claim(key, entry)
         if claim.id in claims:
             raise ValueError(f"{claim.id} stands twice in {key}.toml; remove one")
-        _validate(claim, data["conventions"], data["errata"])
+        _validate(claim, data)
         claims[claim.id] = claim
-    return Paper(key, *(data[part] for part in parts[:-1]), claims)
+    margins = resources.files("rcbook").joinpath("papers", f"{key}.margins.json")
+    measured = json.loads(margins.read_text(encoding="utf-8")) if margins.is_file() else {}
+    given = {part: data[part] for part in parts} | {"claims": claims}
+    return Paper(key, **given, margins=measured.get("claims", {}))
 
 
 def _claim(paper: str, entry: Mapping) -> Claim:
     known = {f.name: f.default is MISSING for f in fields(Claim) if f.name != "paper"}
+    known["role"] = True
     name = entry.get("id", f"a claim of {paper} without id")
     if unknown := entry.keys() - known:
         raise ValueError(f"{name}: unknown field {', '.join(sorted(unknown))}; remove it")
@@ -157,7 +205,8 @@ def _claim(paper: str, entry: Mapping) -> Claim:
     return Claim(paper=paper, **entry)
 
 
-def _validate(claim: Claim, conventions: Mapping, errata: Mapping) -> None:
+def _validate(claim: Claim, data: Mapping) -> None:
+    conventions, errata, changes = data["conventions"], data["errata"], data["changes"]
     problem = ""
     if not claim.id.startswith(f"{claim.paper}."):
         problem = "its id does not begin with the paper's key"
@@ -165,6 +214,16 @@ def _validate(claim: Claim, conventions: Mapping, errata: Mapping) -> None:
         problem = f"kind {claim.kind!r} is none of {', '.join(KINDS)}"
     elif claim.expected not in VERDICTS:
         problem = f"expected {claim.expected!r} is none of {', '.join(VERDICTS)}"
+    elif claim.role not in ROLES:
+        problem = f"role {claim.role!r} is none of {', '.join(ROLES)}"
+    elif claim.flips_under and claim.flips_under not in changes:
+        problem = f"flips_under {claim.flips_under!r} is not in [changes]"
+    elif claim.flips_under and claim.role not in SCORED:
+        problem = f"an {claim.role} has no verdict to flip; remove flips_under"
+    elif claim.word and claim.word not in _ROWS:
+        problem = f"word {claim.word!r} is not in words.toml"
+    elif claim.word and claim.tolerance is not None:
+        problem = "it has a word and a tolerance of its own; remove one"
     elif claim.convention not in conventions:
         problem = f"convention {claim.convention!r} is not in [conventions]"
     elif claim.erratum and claim.erratum not in errata:
@@ -248,7 +307,14 @@ def agrees(claim: Claim, value: object) -> bool:
 
 
 def _tolerance(claim: Claim, printed: str) -> float:
-    return half_width(printed) if claim.tolerance is None else claim.tolerance
+    if claim.tolerance is not None:
+        return claim.tolerance
+    row = _ROWS.get(claim.word)
+    if row is None or (row.value is None and row.absolute is None):
+        return half_width(printed)
+    if row.absolute is not None:
+        return row.absolute
+    return max(half_width(printed), row.value * abs(float(printed)))
 
 
 def tolerances(claim: Claim) -> float | list[float] | None:
@@ -400,15 +466,24 @@ def _row(paper: Paper, judgement: Judgement) -> dict:
         "verdict": judgement.verdict,
         "expected_verdict": claim.expected,
         "tolerance": tolerances(claim),
-        "tolerance_reason": claim.tolerance_reason,
-        "convention": paper.conventions[claim.convention],
+        "tolerance_reason": _tolerance_reason(claim),
+        "convention": paper.conventions[claim.convention]["text"],
         "reason": judgement.reason,
         "erratum": claim.erratum,
         "notebook": paper.notebook,
         "kind": claim.kind,
         "reading": claim.convention,
         "evidence": _finite(dict(judgement.evidence)),
+        "role": claim.role,
+        "word": claim.word,
+        "flips_under": paper.changes[claim.flips_under]["what"] if claim.flips_under else "",
+        "margin": paper.margins.get(claim.id),
     }
+
+
+def _tolerance_reason(claim: Claim) -> str:
+    """Why the tolerance is what it is, where it is not half a digit."""
+    return f"{claim.word}: {_ROWS[claim.word].means}" if claim.word else claim.tolerance_reason
 
 
 def _finite(item: object) -> object:

@@ -159,8 +159,8 @@ def errata_page(papers: Sequence[ledger.Paper], rows: Sequence[Mapping]) -> str:
             parts.append(_erratum(paper.key, key, erratum, decided))
         parts += ["### Readings", "Where the print leaves a choice, we read it so."]
         parts += [
-            f"({_anchor(paper.key, f'reading-{key}')})=\n#### {key}\n\n{text}"
-            for key, text in paper.conventions.items()
+            f"({_anchor(paper.key, f'reading-{key}')})=\n#### {reading['title']}\n\n{reading['text']}"
+            for key, reading in paper.conventions.items()
         ]
     return "\n\n".join(parts) + "\n"
 

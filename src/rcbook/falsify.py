@@ -1,0 +1,182 @@
+"""Change the model a little and see which verdicts turn.
+
+A verdict that nothing turns says nothing.  Every scored claim names a change of `papers/KEY.toml`
+under which its verdict flips; here the notebook is run under that change, without its pictures,
+and the verdicts are compared.  Run at several sizes, a change also tells how far its parameter may
+move before a verdict flips.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from datetime import date
+from importlib import metadata
+from pathlib import Path
+
+from rcbook import ledger
+from rcbook.ledger import Ledger, Paper
+
+LIMIT = 900.0  # s per run; a notebook without its pictures takes less than with them
+SKIP = "no-claims"  # tag of cells that draw or sweep and feed no claim
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What one run of a notebook under one change came to."""
+
+    change: str
+    size: float | None  # None for a change that has no size
+    verdicts: Mapping[str, str]  # by claim id; a claim that was not reached is not there
+    computed: Mapping[str, object]
+    troubles: Sequence[str]  # statements of the notebook that failed under the change
+
+
+def sizes(change: Mapping) -> list[float | None]:
+    """The sizes at which a change is tried, ascending; `[None]` where it has none."""
+    return sorted(change["sizes"]) if "sizes" in change else [None]
+
+
+def trials(paper: Paper, notebooks: Path, wanted: Iterable[tuple[str, float | None]]):
+    """Run the notebook of `paper` under each wanted (change, size), side by side.
+
+    Raises ValueError for a change that the paper does not have.
+    """
+    wanted = list(wanted)
+    if unknown := sorted({name for name, _ in wanted} - paper.changes.keys() - {""}):
+        raise ValueError(f"{paper.key} has no change {', '.join(unknown)}; see [changes]")
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        return list(pool.map(lambda each: _trial(paper, notebooks, *each), wanted))
+
+
+def _trial(paper: Paper, notebooks: Path, name: str, size: float | None) -> Trial:
+    from rcbook.run import kernel_environment
+
+    code = paper.changes[name]["apply"] if name else ""
+    with tempfile.TemporaryDirectory(prefix="rcbook-", ignore_cleanup_errors=True) as scratch:
+        job = json.dumps({"notebook": str(notebooks / paper.notebook), "apply": code, "size": size})
+        done = subprocess.run(
+            [sys.executable, "-m", "rcbook.falsify"],
+            input=job,
+            cwd=notebooks,
+            env=kernel_environment(Path(scratch)) | {"MPLBACKEND": "agg"},
+            capture_output=True,
+            encoding="utf-8",
+            timeout=LIMIT,
+        )
+    if done.returncode:
+        raise ValueError(f"change {name!r} of {paper.key} does not run:\n{done.stderr[-3000:]}")
+    return Trial(name, size, **json.loads(done.stdout.splitlines()[-1]))
+
+
+def run_cells(notebook: Path, apply: str, size: float | None) -> dict:
+    """Run the code cells of `notebook` in this process after the change `apply`.
+
+    Statements run one by one, so that one that fails under the change takes no other with it.
+    """
+    import matplotlib.pyplot as plt
+    import nbformat
+
+    exec(apply, {"size": size})
+    warnings.simplefilter("ignore")  # a changed loop may well overflow
+    space, troubles = {"__name__": "__main__", "display": lambda *_: None}, []
+    for cell in nbformat.read(notebook, as_version=4).cells:
+        if cell.cell_type != "code" or SKIP in cell.metadata.get("tags", ()):
+            continue
+        for statement in ast.parse(cell.source).body:
+            try:
+                exec(compile(ast.Module([statement], []), cell.id, "exec"), space)
+            except Exception as error:
+                troubles.append(f"{cell.id}: {type(error).__name__}: {error}")
+        plt.close("all")
+    judged = {}
+    for item in space.values():
+        if isinstance(item, Ledger):
+            judged |= item.judgements
+    return {
+        "verdicts": {id: judgement.verdict for id, judgement in judged.items()},
+        "computed": {row["id"]: row["computed"] for row in _rows(space)},
+        "troubles": troubles,
+    }
+
+
+def _rows(space: Mapping) -> Iterable[Mapping]:
+    for item in space.values():
+        if isinstance(item, Ledger):
+            yield from item.rows()
+
+
+def unflipped(paper: Paper, tried: Sequence[Trial]) -> list[str]:
+    """Why the scored claims of `paper` are not all shown to be falsifiable; empty when they are.
+
+    A claim is, when the change it names turns its verdict at the largest size tried.
+    """
+    largest = {trial.change: trial for trial in sorted(tried, key=lambda t: t.size or 0.0)}
+    problems = []
+    for claim in paper.claims.values():
+        if claim.role not in ledger.SCORED or claim.expected == ledger.NOT_COMPUTABLE:
+            continue
+        trial = largest.get(claim.flips_under)
+        if not claim.flips_under:
+            problems.append(f"{claim.id}: names no change that flips it; is it an identity?")
+        elif trial is None:
+            problems.append(f"{claim.id}: its change {claim.flips_under!r} was not tried")
+        elif claim.id not in trial.verdicts:
+            problems.append(f"{claim.id}: not reached under {claim.flips_under!r}")
+        elif trial.verdicts[claim.id] == claim.expected:
+            problems.append(f"{claim.id}: still {claim.expected} under {claim.flips_under!r}")
+    return problems
+
+
+def margins(paper: Paper, tried: Sequence[Trial]) -> dict[str, dict]:
+    """How far the most telling parameter may move before each scored verdict flips.
+
+    For every claim the change that flips it at the smallest size: the largest size at which all
+    smaller ones kept the verdict too, and the one at which it flipped.
+    """
+    found: dict[str, dict] = {}
+    for name, change in paper.changes.items():
+        series = sorted((t for t in tried if t.change == name and t.size), key=lambda t: t.size)
+        for claim in paper.claims.values():
+            if claim.role not in ledger.SCORED or claim.expected == ledger.NOT_COMPUTABLE:
+                continue
+            reached = [t for t in series if claim.id in t.verdicts]
+            flips = next((t for t in reached if t.verdicts[claim.id] != claim.expected), None)
+            if flips is None or flips.size >= found.get(claim.id, {}).get("flips", float("inf")):
+                continue
+            kept = [t.size for t in reached if t.size < flips.size]
+            found[claim.id] = {
+                "change": name,
+                "what": change["what"],
+                "unit": change.get("unit", "relative"),
+                "keeps": max(kept, default=0.0),
+                "flips": flips.size,
+            }
+    return found
+
+
+def store(paper: Paper, found: Mapping[str, Mapping]) -> Path:
+    """Write `found` beside the paper's data, with the date and versions that it was measured at."""
+    from rcbook.run import write
+
+    versions = {name: metadata.version(name) for name in ("numpy", "scipy")}
+    head = {"date": date.today().isoformat(), "python": platform.python_version(), **versions}
+    path = Path(ledger.__file__).parent / "papers" / f"{paper.key}.margins.json"
+    write(path, json.dumps({**head, "claims": found}, indent=1) + "\n")
+    return path
+
+
+if __name__ == "__main__":
+    job = json.load(sys.stdin)
+    out, sys.stdout = sys.stdout, sys.stderr  # notebooks may print; the answer stands alone
+    answer = run_cells(Path(job["notebook"]), job["apply"], job["size"])
+    print(json.dumps(answer), file=out)
