@@ -51,6 +51,10 @@ def _parser() -> argparse.ArgumentParser:
     falsify.add_argument("--change", metavar="NAME", help="only this change of the paper")
     falsify.add_argument("--measure", action="store_true", help="at all sizes; store the margins")
     falsify.set_defaults(run=_falsify)
+    numbers = commands.add_parser("numbers", help="account for every number in the book's text")
+    numbers.add_argument("--rewrite", action="store_true", help="execute, and type what comes out")
+    numbers.add_argument("--file", metavar="NAME", help="only this file, such as one_idea.ipynb")
+    numbers.set_defaults(run=_numbers)
     show = commands.add_parser("ledger", help="print the ledger of the last run")
     show.add_argument("--json", action="store_true", help="as a list of objects")
     show.add_argument("--paper", metavar="KEY", help="only this paper, such as horng1989")
@@ -114,6 +118,25 @@ def _falsify(arguments: argparse.Namespace) -> int:
             falsify.store(paper, falsify.margins(paper, tried))
     print(f"{shown} scored claims, {problems} not shown to be falsifiable")
     return FAILED if problems else OK
+
+
+def _numbers(arguments: argparse.Namespace) -> int:
+    from rcbook import numbers, prose, run
+    from rcbook.project import find
+
+    project = find(Path.cwd())
+    if arguments.rewrite:
+        paths = sorted(project.notebooks.glob(arguments.file or "*.ipynb"))
+        _, failures, typed = run.execute(paths)
+        for failure in failures:
+            print(f"{failure.notebook}, {failure.cell}: {run.plain(failure.what)}")
+        print(f"{numbers.rewrite(project, typed)} numbers rewritten")
+    places = [p for p in numbers.survey(project) if arguments.file in (None, p.file)]
+    lost = [place for place in places if place.number.kind == prose.UNACCOUNTED]
+    print("".join(f"UNACCOUNTED {place}\n" for place in lost), end="")
+    print(numbers.table(places))
+    print(f"\n{len(places)} numbers in the text, {len(lost)} unaccounted")
+    return FAILED if lost else OK
 
 
 def _ledger(arguments: argparse.Namespace) -> int:

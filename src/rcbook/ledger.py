@@ -22,6 +22,8 @@ from decimal import Decimal, InvalidOperation
 from importlib import resources
 from numbers import Integral, Real
 
+from rcbook import prose
+
 MIME = "application/vnd.rcbook.ledger+json"
 
 REPRODUCED = "reproduced"
@@ -136,13 +138,22 @@ def _last_digit(printed: str) -> int:
     return exponent
 
 
-def words() -> dict[str, Word]:
-    """The table of unsharp words, by the key of each row."""
+def _read(item):
+    """`item` with the marks of its numbers taken out of every text."""
+    if isinstance(item, str):
+        return prose.without_marks(item)
+    if isinstance(item, dict):
+        return {name: _read(part) for name, part in item.items()}
+    return item
+
+
+def words_source() -> dict:
+    """The table of unsharp words as its file has it."""
     text = resources.files("rcbook").joinpath("words.toml").read_text(encoding="utf-8")
-    return {key: Word(**row) for key, row in tomllib.loads(text).items()}
+    return tomllib.loads(text)
 
 
-WORDS = words()
+WORDS = {key: Word(**_read(row)) for key, row in words_source().items()}
 _ROWS = {name: row for row in WORDS.values() for name in row.words}
 
 
@@ -174,10 +185,7 @@ def load(key: str) -> Paper:
     reference to a convention or erratum that is not there, and a claim expected to fail whose
     reason quotes nothing computed.
     """
-    source = resources.files("rcbook").joinpath("papers", f"{key}.toml")
-    if not source.is_file():
-        raise ValueError(f"no paper {key!r}; choose one of {', '.join(papers())}")
-    data = tomllib.loads(source.read_text(encoding="utf-8"))
+    data = source(key)
     parts = [f.name for f in fields(Paper) if f.name not in ("key", "margins")]
     if absent := [part for part in parts if part not in data]:
         raise ValueError(f"{key}.toml lacks {', '.join(absent)}; add them")
@@ -190,8 +198,16 @@ def load(key: str) -> Paper:
         claims[claim.id] = claim
     margins = resources.files("rcbook").joinpath("papers", f"{key}.margins.json")
     measured = json.loads(margins.read_text(encoding="utf-8")) if margins.is_file() else {}
-    given = {part: data[part] for part in parts} | {"claims": claims}
+    given = _read({part: data[part] for part in parts}) | {"claims": claims}
     return Paper(key, **given, margins=measured.get("claims", {}))
+
+
+def source(key: str) -> dict:
+    """What `papers/KEY.toml` holds, marks and all.  Raises ValueError for an unknown key."""
+    file = resources.files("rcbook").joinpath("papers", f"{key}.toml")
+    if not file.is_file():
+        raise ValueError(f"no paper {key!r}; choose one of {', '.join(papers())}")
+    return tomllib.loads(file.read_text(encoding="utf-8"))
 
 
 def _claim(paper: str, entry: Mapping) -> Claim:
@@ -202,7 +218,7 @@ def _claim(paper: str, entry: Mapping) -> Claim:
         raise ValueError(f"{name}: unknown field {', '.join(sorted(unknown))}; remove it")
     if absent := [field for field, needed in known.items() if needed and field not in entry]:
         raise ValueError(f"{name}: lacks {', '.join(absent)}; add it")
-    return Claim(paper=paper, **entry)
+    return Claim(paper=paper, **_read(entry))
 
 
 def _validate(claim: Claim, data: Mapping) -> None:
@@ -422,6 +438,21 @@ class Ledger:
         self.judgements[id] = judge(self.paper.claims[id], value, corrected, **evidence)
         self._fresh[:] = [*(fresh for fresh in self._fresh if fresh != id), id]
         return self.judgements[id]
+
+    def value(self, id: str, name: str = "") -> object:
+        """What was computed for the claim `id`, or the piece `name` of its evidence.
+
+        Raises ValueError for a claim not judged yet, and for evidence it does not have.
+        """
+        if id not in self.judgements:
+            raise ValueError(f"{id} is not judged yet; check it first")
+        judgement = self.judgements[id]
+        if not name:
+            return judgement.computed
+        if name not in judgement.evidence:
+            known = ", ".join(judgement.evidence)
+            raise ValueError(f"{id} has no evidence {name!r}; it has {known or 'none'}")
+        return judgement.evidence[name]
 
     def missing(self) -> list[str]:
         """Ids of the claims not checked yet."""

@@ -13,7 +13,10 @@ from urllib.parse import urlencode
 import rcbook
 from rcbook import ledger
 
-_MACHINERY = ("rcbook.run", "rcbook.render", "rcbook.pages", "rcbook.cli", "rcbook.project")
+_MACHINERY = tuple(
+    f"rcbook.{name}"
+    for name in ("run", "render", "pages", "cli", "project", "falsify", "numbers", "prose")
+)
 _COLUMNS = ("Claim", "Printed", "Ours", "Tolerance", "Verdict", "Reason")
 _MATH = re.compile(r"\$([^$]+)\$")
 
@@ -159,7 +162,8 @@ def errata_page(papers: Sequence[ledger.Paper], rows: Sequence[Mapping]) -> str:
             parts.append(_erratum(paper.key, key, erratum, decided))
         parts += ["### Readings", "Where the print leaves a choice, we read it so."]
         parts += [
-            f"({_anchor(paper.key, f'reading-{key}')})=\n#### {reading['title']}\n\n{reading['text']}"
+            f"({_anchor(paper.key, f'reading-{key}')})=\n"
+            f"#### {reading['title']}\n\n{reading['text']}"
             for key, reading in paper.conventions.items()
         ]
     return "\n\n".join(parts) + "\n"

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import nbformat
 
-from rcbook import ledger, pages
+from rcbook import ledger, pages, prose
 from rcbook.project import Project
-from rcbook.run import Run, plain
+from rcbook.run import Run, alternative, plain
 
 TAIL = 60  # lines of Sphinx's output shown when it fails
 _JUPYTER_BOOK = "from jupyter_book.cli.main import main; main()"  # it has no __main__
@@ -53,8 +53,9 @@ def fill(stage: Path, project: Project, run: Run) -> None:
     for name, notebook in run.notebooks.items():
         text = nbformat.writes(shown(notebook))
         (stage / "notebooks" / name).write_text(text, encoding="utf-8")
-    for name, text in pages.pages(project.papers, run.rows).items():
-        (stage / name).write_text(text, encoding="utf-8")
+    written = {page.name: page.read_text(encoding="utf-8") for page in project.book.glob("*.md")}
+    for name, text in (written | pages.pages(project.papers, run.rows)).items():
+        (stage / name).write_text(prose.without_marks(text), encoding="utf-8")
 
 
 def cover(notebooks: Mapping[str, nbformat.NotebookNode]) -> bytes:
@@ -69,9 +70,14 @@ def cover(notebooks: Mapping[str, nbformat.NotebookNode]) -> bytes:
 
 
 def shown(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
-    """A copy of `notebook` for the renderer: ids in its ledgers link to the ledger page."""
+    """A copy of `notebook` for the renderer: no marks of numbers, and ids in its ledgers link to
+    the ledger page."""
     notebook = nbformat.from_dict(notebook)
     for cell in notebook.cells:
+        if cell.cell_type == "markdown":
+            cell.source = prose.without_marks(cell.source)
+        elif alternative(cell):
+            cell.metadata["mystnb"]["image"]["alt"] = prose.without_marks(alternative(cell))
         for output in cell.get("outputs", ()):
             data = output.get("data", {})
             data.pop(ledger.MIME, None)  # the renderer would warn of what it does not know

@@ -8,6 +8,7 @@ import re
 import sys
 import tempfile
 import time
+from ast import literal_eval
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,7 +23,7 @@ from nbclient import NotebookClient
 from nbclient.exceptions import CellExecutionError, DeadKernelError
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from rcbook import ledger
+from rcbook import ledger, prose
 from rcbook.pages import counts
 from rcbook.project import Project
 
@@ -50,6 +51,7 @@ class Run:
 
     notebooks: Mapping[str, nbformat.NotebookNode]  # executed, by file name
     failures: Sequence[Failure]
+    typed: Mapping[str, Sequence[Typed]]  # numbers of the text, by file name
     rows: Sequence[Mapping] = ()  # of the ledger, papers in order, claims in the paper's order
     missing: Sequence[str] = ()  # ids never computed
 
@@ -69,6 +71,23 @@ class Run:
         return self.complete and not self.flips
 
 
+@dataclass(frozen=True)
+class Typed:
+    """A number of a notebook's text beside what the run computes for it."""
+
+    cell: str  # its id
+    alt: bool  # whether it stands in the alternative text of the cell and not in its source
+    start: int  # where it begins in that text
+    text: str
+    expression: str
+    computed: str  # formatted; empty where the expression failed
+    trouble: str = ""
+
+    @property
+    def right(self) -> bool:
+        return prose.same(self.text, self.computed)
+
+
 @dataclass
 class _Track:
     """How far one notebook has come."""
@@ -78,6 +97,7 @@ class _Track:
     log: BinaryIO  # the kernel's own stderr, last words included
     at: int = 0
     source: str = ""
+    typed: list[Typed] = field(default_factory=list)  # the numbers of the text, evaluated
     began: float = field(default_factory=time.monotonic)
 
     def last_words(self) -> str:
@@ -123,15 +143,27 @@ def write(path: Path, text: str) -> None:
 def execute(paths: Sequence[Path], limit: float = LIMIT):
     """Execute notebooks side by side, at most `limit` seconds each.
 
-    Returns the executed notebooks by file name, and the failures.
+    Returns the executed notebooks by file name, the failures, and the numbers of their texts by
+    file name.  A number that is not what the run computes is a failure.
     Raises ValueError for a file that is no notebook.
     """
     notebooks = {path: read(path) for path in paths}
     with tempfile.TemporaryDirectory(prefix="rcbook-", ignore_cleanup_errors=True) as scratch:
         environment = kernel_environment(Path(scratch))
-        failures = asyncio.run(_execute_all(notebooks, limit, environment))
+        done = asyncio.run(_execute_all(notebooks, limit, environment))
     executed = {path.name: notebook for path, notebook in notebooks.items()}
-    return executed, [failure for failure in failures if failure]
+    typed = {path.name: numbers for path, (_, numbers) in zip(notebooks, done, strict=True)}
+    failures = [failure for failure, _ in done if failure]
+    failures += [_mistyped(name, n) for name, found in typed.items() for n in found if not n.right]
+    return executed, failures, typed
+
+
+def _mistyped(name: str, number: Typed) -> Failure:
+    where = f"cell {number.cell}{', alternative text' if number.alt else ''}"
+    if number.trouble:
+        return Failure(name, f"{{{number.expression}}} failed: {number.trouble}", where)
+    what = f"the text says {number.text}, and {{{number.expression}}} is {number.computed}"
+    return Failure(name, f"{what}; mend it by `rcbook numbers --rewrite`", where)
 
 
 def read(path: Path) -> nbformat.NotebookNode:
@@ -167,7 +199,7 @@ async def _execute_all(notebooks: Mapping, limit: float, environment: Mapping) -
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[cell]}"))
     with Progress(*columns, TimeElapsedColumn(), disable=not sys.stdout.isatty()) as progress:
 
-        async def one(path: Path, notebook: nbformat.NotebookNode) -> Failure | None:
+        async def one(path: Path, notebook: nbformat.NotebookNode):
             async with slots:
                 return await _execute_one(path, notebook, limit, environment, progress)
 
@@ -180,8 +212,11 @@ async def _execute_one(
     limit: float,
     environment: Mapping,
     progress: Progress,
-) -> Failure | None:
-    """Execute `notebook` in place; why it failed, or None.  No kernel is left behind."""
+) -> tuple[Failure | None, list[Typed]]:
+    """Execute `notebook` in place; why it failed, or None, and the numbers of its text.
+
+    No kernel is left behind.
+    """
     cells = sum(_runs(cell) for cell in notebook.cells)
     line = progress.add_task(path.name, total=cells, cell="starting")
     _say(progress, f"{path.name}: executing {cells} code cells")
@@ -201,7 +236,7 @@ async def _execute_one(
     seconds = time.monotonic() - track.began
     progress.update(line, completed=track.at, cell="FAILED" if failure else "done")
     _say(progress, f"{path.name}: {'FAILED' if failure else 'done'} after {seconds:.1f} s")
-    return failure
+    return failure, track.typed
 
 
 def _failure(task: asyncio.Task, track: _Track, limit: float) -> Failure | None:
@@ -232,20 +267,59 @@ async def _run_cells(notebook, folder: Path, environment: Mapping, track: _Track
         await client.async_start_new_kernel_client()
         reply = await client.kc.kernel_info(reply=True, timeout=60)
         notebook.metadata["language_info"] = reply["content"]["language_info"]
+        waiting = []
         for index, cell in enumerate(notebook.cells):
-            if not _runs(cell):
-                continue
-            track.at, track.source = track.at + 1, cell.source
-            advance()
-            await client.async_execute_cell(cell, index, execution_count=track.at)
-            if written := _stderr(cell):
-                raise _Stopped(written)
+            if _runs(cell):
+                track.at, track.source = track.at + 1, cell.source
+                advance()
+                await client.async_execute_cell(cell, index, execution_count=track.at)
+                if written := _stderr(cell):
+                    raise _Stopped(written)
+            waiting += await _type(client.kc, to_check(cell), track, last=False)
+        await _type(client.kc, waiting, track, last=True)
     finally:
         if client.kc is not None:
             client.kc.stop_channels()
         if manager.has_kernel:
             await manager.shutdown_kernel(now=True)
         await ensure_async(manager.cleanup_resources())
+
+
+def to_check(cell: nbformat.NotebookNode) -> list[tuple[str, bool, prose.Number]]:
+    """The computed numbers of a cell's text or alternative text: cell id, which, number."""
+    texts = [(True, alternative(cell))]
+    if cell.cell_type == "markdown":
+        texts.append((False, cell.source))
+    found = ((alt, number) for alt, text in texts for number in prose.numbers(text))
+    return [(cell.id, alt, n) for alt, n in found if n.kind == prose.COMPUTED]
+
+
+def alternative(cell: nbformat.NotebookNode) -> str:
+    """The alternative text of a cell that draws, or nothing."""
+    return cell.metadata.get("mystnb", {}).get("image", {}).get("alt", "")
+
+
+async def _type(kernel, wanted: Sequence, track: _Track, last: bool) -> list:
+    """Evaluate numbers of the text in `kernel` and keep them in `track`.
+
+    Returns those that have to wait for the end of the run, because a name does not exist yet.
+    """
+    if not wanted:
+        return []
+    asked = {str(i): f"format({n.expression}, {n.spec!r})" for i, (*_, n) in enumerate(wanted)}
+    settings = {"silent": True, "store_history": False, "user_expressions": asked}
+    reply = await ensure_async(kernel.execute("", reply=True, timeout=60, **settings))
+    waiting = []
+    for i, (cell, alt, number) in enumerate(wanted):
+        result = reply["content"]["user_expressions"][str(i)]
+        if result["status"] != "ok" and result["ename"] == "NameError" and not last:
+            waiting.append((cell, alt, number))
+            continue
+        value = literal_eval(result["data"]["text/plain"]) if result["status"] == "ok" else ""
+        trouble = "" if value else f"{result.get('ename')}: {result.get('evalue')}"
+        given = (number.start, number.text, number.expression, value, trouble)
+        track.typed.append(Typed(cell, alt, *given))
+    return waiting
 
 
 def _runs(cell: nbformat.NotebookNode) -> bool:
@@ -265,6 +339,7 @@ def judge(
     papers: Iterable[ledger.Paper],
     notebooks: Mapping[str, nbformat.NotebookNode],
     failures: Sequence[Failure],
+    typed: Mapping[str, Sequence[Typed]],
 ) -> Run:
     """Put the rows that executed notebooks show beside the claims of `papers`.
 
@@ -283,7 +358,7 @@ def judge(
                 failures.append(Failure(name, f"it contradicts {shown[id][0]} about {id}"))
             shown[id] = (name, row)
     rows = [shown[id][1] for id in ids if id in shown]
-    return Run(notebooks, failures, rows, [id for id in ids if id not in shown])
+    return Run(notebooks, failures, typed, rows, [id for id in ids if id not in shown])
 
 
 def _rows(notebook: nbformat.NotebookNode) -> Iterable[Mapping]:
@@ -313,7 +388,10 @@ def report(run: Run) -> None:
             f"ours {ledger.show_value(row['computed'])}, verdict {row['verdict']}, "
             f"expected {row['expected_verdict']}{': ' if row['reason'] else ''}{row['reason']}"
         )
-    print(f"\n{counts(run.rows)}; {len(run.missing)} never computed, {len(run.flips)} flipped")
+    typed = [number for numbers in run.typed.values() for number in numbers]
+    wrong = sum(not number.right for number in typed)
+    print(f"\n{len(typed)} numbers of the text computed, {wrong} of them wrong")
+    print(f"{counts(run.rows)}; {len(run.missing)} never computed, {len(run.flips)} flipped")
 
 
 def plain(text: str) -> str:

@@ -1,0 +1,151 @@
+"""Account for every number in the book's text, and rewrite those that are computed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import nbformat
+
+from rcbook import ledger, prose
+from rcbook.project import Project
+
+ROUND = 30  # characters shown on either side of a number
+
+
+@dataclass(frozen=True)
+class Place:
+    """A number of the book's text: in which file, in which cell or claim, and what it is."""
+
+    file: str
+    at: str
+    number: prose.Number
+    around: str
+
+    def __str__(self) -> str:
+        return f"{self.file}, {self.at}: {self.number.text}   [{self.around}]"
+
+
+def survey(project: Project) -> list[Place]:
+    """Every number in notebooks, data files and pages of the book.
+
+    Raises ValueError, naming the place, for a mark that cannot be read.
+    """
+    printed = {claim.id: claim.printed for p in project.papers for claim in p.claims.values()}
+    found: list[Place] = []
+    for path in sorted(project.notebooks.glob("*.ipynb")):
+        found += _read(path.name, _cells(path), lambda text: prose.numbers(text, _of(printed)))
+    for paper in project.papers:
+        for at, text, quoted in _texts(paper.key):
+            found += _read(
+                f"{paper.key}.toml", [(at, text)], lambda t, q=quoted: prose.of_template(t, q)
+            )
+    for path in sorted(project.book.glob("*.md")):
+        text = path.read_text(encoding="utf-8")
+        found += _read(path.name, [("text", text)], prose.numbers)
+    found += _read("words.toml", _words(), prose.numbers)
+    return found
+
+
+def _of(printed: Mapping[str, str]) -> Callable[[str], str]:
+    def look_up(id: str) -> str:
+        if id not in printed:
+            raise ValueError(f"<!-- claim: {id} --> names no claim of any paper")
+        return printed[id]
+
+    return look_up
+
+
+def _read(file: str, texts: Iterable[tuple[str, str]], numbers: Callable) -> list[Place]:
+    found = []
+    for at, text in texts:
+        try:
+            listed = numbers(text)
+        except ValueError as error:
+            raise ValueError(f"{file}, {at}: {error}") from None
+        for n in listed:
+            around = text[max(0, n.start - ROUND) : n.end + ROUND].replace("\n", " ")
+            found.append(Place(file, at, n, around))
+    return found
+
+
+def _cells(path: Path) -> Iterable[tuple[str, str]]:
+    from rcbook.run import alternative
+
+    for cell in nbformat.read(path, as_version=4).cells:
+        if cell.cell_type == "markdown":
+            yield cell.id, cell.source
+        elif text := alternative(cell):
+            yield f"{cell.id} (alternative text)", text
+
+
+def _texts(key: str) -> Iterable[tuple[str, str, Sequence[str]]]:
+    """The texts of a paper's data file that are ours, each with what it may quote unmarked."""
+    data = ledger.source(key)
+    for claim in data["claims"]:
+        quoted = [claim[name] for name in ("says", "printed", "where", "unit")]
+        for name in ("reason", "tolerance_reason", "lost"):
+            yield f"{claim['id']} {name}", claim.get(name, ""), quoted
+    for name, erratum in data["errata"].items():
+        yield (
+            f"erratum {name}",
+            erratum["why"].replace("{", "{{").replace("}", "}}"),
+            [erratum[part] for part in ("where", "printed", "corrected")],
+        )
+    for name, reading in data["conventions"].items():
+        for part in ("title", "text"):
+            plain = reading[part].replace("{", "{{").replace("}", "}}")
+            yield f"reading {name}", plain, ()
+    for name, change in data["changes"].items():
+        yield f"change {name}", change["what"], ()
+    for name, text in {**data["idea"], "title": data["title"]}.items():
+        yield name, text, ()
+
+
+def _words() -> Iterable[tuple[str, str]]:
+    return ((key, row["means"]) for key, row in ledger.words_source().items())
+
+
+def rewrite(project: Project, typed: Mapping[str, Sequence]) -> int:
+    """Put what a run computed into the notebooks; how many numbers changed.
+
+    A number whose expression failed stays as it is.
+    """
+    changed = 0
+    for name, numbers in typed.items():
+        wrong = [n for n in numbers if n.computed and not n.right]
+        if not wrong:
+            continue
+        path = project.notebooks / name
+        notebook = nbformat.read(path, as_version=4)
+        for cell in notebook.cells:
+            for alt in (False, True):
+                values = {n.start: n.computed for n in wrong if (n.cell, n.alt) == (cell.id, alt)}
+                _put(cell, alt, values)
+        from rcbook.run import write
+
+        write(path, nbformat.writes(notebook) + "\n")
+        changed += len(wrong)
+    return changed
+
+
+def _put(cell: nbformat.NotebookNode, alt: bool, values: Mapping[int, str]) -> None:
+    if not values:
+        return
+    if alt:
+        image = cell.metadata["mystnb"]["image"]
+        image["alt"] = prose.rewritten(image["alt"], values)
+    else:
+        cell.source = prose.rewritten(cell.source, values)
+
+
+def table(places: Sequence[Place]) -> str:
+    """Counts per file and class, as text."""
+    width = max((len(place.file) for place in places), default=4)
+    lines = [f"{'':{width}}  " + "  ".join(prose.CLASSES)]
+    for file in dict.fromkeys(place.file for place in places):
+        tally = prose.tally([place.number for place in places if place.file == file])
+        cells = "  ".join(f"{tally[kind]:>{len(kind)}}" for kind in prose.CLASSES)
+        lines.append(f"{file:{width}}  {cells}")
+    return "\n".join(lines)
