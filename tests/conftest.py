@@ -33,7 +33,7 @@ ERRATA = {
     "pen": {"where": "p. 3", "printed": "runnout", "corrected": "runout", "why": "spelling"},
 }
 PAPER = Paper("fake", "The case one", "Nobody, Nowhere, 1989.", "one.ipynb", 1,
-              {"loop": "a loop", "index": "time", "period": "a turn"},
+              {"cite": "francis1976", "loop": "a loop", "index": "time", "period": "a turn"},
               {"primary": {"title": "The plain reading", "text": "as printed"}}, ERRATA, {},
               {claim.id: claim for claim in CLAIMS})
 ledger = Ledger(PAPER)

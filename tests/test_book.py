@@ -1,5 +1,14 @@
 """The real book, built once: every notebook executed, every claim judged as expected."""
 
+import json
+from importlib import resources
+
+import jsonschema
+import nbformat
+import pytest
+import yaml
+from conftest import ROOT
+
 from rcbook import ledger
 
 
@@ -36,3 +45,22 @@ def test_every_notebook_has_its_place_among_the_chapters(built):
     for notebook in (built / "notebooks").glob("*.ipynb"):
         assert (html / "notebooks" / f"{notebook.stem}.html").is_file()
         assert f'href="notebooks/{notebook.stem}.html"' in landing
+
+
+def test_the_ledger_is_what_its_schema_says(rows):
+    schema = json.loads(resources.files("rcbook").joinpath("ledger.schema.json").read_text())
+    jsonschema.validate(rows, schema)
+    for spoiled in ({"role": "guess"}, {"verdict": "fine"}, {"computed": "3"}, {"colour": "red"}):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate([{**rows[0], **spoiled}], schema)
+
+
+def test_chapters_have_one_order_and_one_title_everywhere():
+    papers = [ledger.load(key) for key in ledger.papers()]
+    contents = yaml.safe_load((ROOT / "book" / "_toc.yml").read_text(encoding="utf-8"))
+    listed = [chapter["file"] for part in contents["parts"] for chapter in part["chapters"]]
+    names = [f"notebooks/{paper.notebook.removesuffix('.ipynb')}" for paper in papers]
+    assert [name for name in listed if name in names] == names
+    for paper in papers:
+        first = nbformat.read(ROOT / "notebooks" / paper.notebook, as_version=4).cells[0]
+        assert first.source.splitlines()[0] == f"# {paper.title}"

@@ -1,15 +1,16 @@
-// Filters the table of the ledger page by paper, verdict and free text; without this script the
+// Filters the table of the ledger page by paper, verdict, role and free text; without this script the
 // page shows every claim.
 "use strict";
 
 function filterLedger(form, rows) {
-  const { paper, verdict, text } = form.elements;
+  const { paper, verdict, role, text } = form.elements;
   const words = text.value.toLowerCase().split(/\s+/).filter(Boolean);
   let shown = 0;
   for (const row of rows) {
     const keep =
       (!paper.value || row.dataset.paper === paper.value) &&
       (!verdict.value || row.dataset.verdict === verdict.value) &&
+      (!role.value || row.dataset.role.split(" ").includes(role.value)) &&
       words.every((word) => row.textContent.toLowerCase().includes(word));
     row.hidden = !keep;
     shown += keep ? 1 : 0;
@@ -22,7 +23,7 @@ function startLedger() {
   if (!form) return;
   const rows = [...document.querySelectorAll("table.rcbook-full tbody tr")];
   const asked = new URLSearchParams(window.location.search);
-  for (const name of ["paper", "verdict", "text"]) {
+  for (const name of ["paper", "verdict", "role", "text"]) {
     if (asked.has(name)) form.elements[name].value = asked.get(name);
   }
   const update = () => filterLedger(form, rows);

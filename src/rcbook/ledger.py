@@ -77,7 +77,7 @@ class Paper:
     citation: str
     notebook: str
     chapter: int  # its place in the order of reading
-    idea: Mapping[str, str]  # its row in the table of the one idea: loop, index, period
+    idea: Mapping[str, str]  # its row in the table of the one idea: cite, loop, index, period
     conventions: Mapping[str, Mapping[str, str]]  # each a `title` and a `text`
     errata: Mapping[str, Mapping[str, str]]
     changes: Mapping[str, Mapping]  # of the model, which turn verdicts; see `falsify`

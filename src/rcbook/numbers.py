@@ -99,8 +99,9 @@ def _texts(key: str) -> Iterable[tuple[str, str, Sequence[str]]]:
             yield f"reading {name}", plain, ()
     for name, change in data["changes"].items():
         yield f"change {name}", change["what"], ()
-    for name, text in {**data["idea"], "title": data["title"]}.items():
-        yield name, text, ()
+    for name in ("loop", "index", "period"):
+        yield f"idea {name}", data["idea"][name], ()
+    yield "title", data["title"], ()
 
 
 def _words() -> Iterable[tuple[str, str]]:

@@ -25,6 +25,7 @@ def pages(papers: Sequence[ledger.Paper], rows: Sequence[Mapping]) -> dict[str, 
     """The generated pages as MyST Markdown, by file name."""
     return {
         "scoreboard.md": scoreboard(papers, rows),
+        "idea.md": idea_table(papers),
         "ledger.md": ledger_page(papers, rows),
         "errata.md": errata_page(papers, rows),
         "api.md": api_page(),
@@ -32,53 +33,117 @@ def pages(papers: Sequence[ledger.Paper], rows: Sequence[Mapping]) -> dict[str, 
 
 
 def scoreboard(papers: Sequence[ledger.Paper], rows: Sequence[Mapping]) -> str:
-    """Claims per verdict and paper, as a table whose counts lead to the filtered ledger."""
-    head = "".join(f'<th scope="col">{v.capitalize()}</th>' for v in (*ledger.VERDICTS, "all"))
+    """Claims per verdict and paper: headlines, all results, and what stands outside the score.
+
+    Every count leads to the filtered ledger.
+    """
+    headlines = _score(papers, rows, "headline", "Headlines", outside=False)
+    results = _score(papers, rows, "scored", "All results, headlines included", outside=True)
+    return _raw(headlines + "\n" + results)
+
+
+def _score(papers, rows, group: str, title: str, outside: bool) -> str:
+    heads = (*ledger.VERDICTS, "all") + ("inputs and identities",) * outside
+    head = "".join(f'<th scope="col">{h.capitalize()}</th>' for h in heads)
     body = ""
     for paper in papers:
-        tally = Counter(row["verdict"] for row in rows if row["paper"] == paper.key)
-        cells = "".join(_count(paper.key, v, tally[v]) for v in ledger.VERDICTS)
+        own = [row for row in rows if row["paper"] == paper.key]
+        tally = Counter(row["verdict"] for row in own if group in roles(row))
         name = f'<a href="{_chapter(paper)}">{_math(paper.title)}</a>'
-        total = _count(paper.key, "", tally.total())
-        body += f'<tr><th scope="row">{name}</th>{cells}{total}</tr>\n'
-    return _raw(
-        '<div class="rcbook-wide" tabindex="0" role="region" aria-label="Claims per verdict">\n'
-        f'<table class="rcbook-score"><thead><tr><th scope="col">Paper</th>{head}</tr></thead>\n'
+        cells = "".join(_count(paper.key, v, group, tally[v]) for v in ledger.VERDICTS)
+        cells += _count(paper.key, "", group, tally.total())
+        if outside:
+            beyond = sum("outside" in roles(row) for row in own)
+            cells += _count(paper.key, "", "outside", beyond)
+        body += f'<tr><th scope="row">{name}</th>{cells}</tr>\n'
+    return (
+        f'<div class="rcbook-wide" tabindex="0" role="region" aria-label="{title}">\n'
+        f'<table class="rcbook-score"><caption>{title}</caption>'
+        f'<thead><tr><th scope="col">Chapter</th>{head}</tr></thead>\n'
         f"<tbody>{body}</tbody></table></div>"
     )
 
 
+def roles(row: Mapping) -> tuple[str, str]:
+    """The role of a row and whether it is `scored` or `outside` the score."""
+    return row["role"], "scored" if row["role"] in ledger.SCORED else "outside"
+
+
 def counts(rows: Iterable[Mapping]) -> str:
-    """`'5 claims: 4 reproduced, 1 not computable'` for ledger rows, in the order of VERDICTS."""
-    tally = Counter(row["verdict"] for row in rows)
+    """`'5 results: 4 reproduced, ..., and 2 inputs and identities'` for ledger rows."""
+    rows = list(rows)
+    scored = [row for row in rows if row["role"] in ledger.SCORED]
+    tally = Counter(row["verdict"] for row in scored)
     parts = ", ".join(f"{tally[verdict]} {verdict}" for verdict in ledger.VERDICTS)
-    total = sum(tally.values())
-    return f"{total} claim{'s' if total != 1 else ''}: {parts}"
+    headlines = sum(row["role"] == "headline" for row in scored)
+    return (
+        f"{len(rows)} claims, {len(scored)} of them results ({headlines} headlines): {parts}; "
+        f"{len(rows) - len(scored)} inputs and identities outside the score"
+    )
 
 
-def _count(paper: str, verdict: str, count: int) -> str:
-    query = html.escape(urlencode({"paper": paper, "verdict": verdict}))
+def _count(paper: str, verdict: str, role: str, count: int) -> str:
+    query = html.escape(urlencode({"paper": paper, "verdict": verdict, "role": role}))
     shown = f'<a href="ledger.html?{query}">{count}</a>' if count else "0"
     return f"<td>{shown}</td>"
 
 
+def idea_table(papers: Sequence[ledger.Paper]) -> str:
+    """The papers as rows of one table: what loop, over what index, with what period."""
+    head = "| chapter | loop | index | period $N$ |\n|---|---|---|---|\n"
+    return head + "".join(_idea(paper) for paper in papers)
+
+
+def _idea(paper: ledger.Paper) -> str:
+    idea = paper.idea
+    chapter = f"[{paper.title.partition(':')[0]}](notebooks/{paper.notebook})"
+    loop = f"{idea['loop']} {{cite}}`{idea['cite']}`"
+    return f"| {chapter} | {loop} | {idea['index']} | {idea['period']} |\n"
+
+
 def ledger_page(papers: Sequence[ledger.Paper], rows: Sequence[Mapping]) -> str:
     """Every claim with its verdict; one anchor per claim id, and a filter where scripts run."""
-    chapters = {paper.key: _chapter(paper) for paper in papers}
+    by_key = {paper.key: paper for paper in papers}
     head = "".join(f'<th role="columnheader" scope="col">{c}</th>' for c in _COLUMNS)
-    body = "\n".join(_ledger_row(row, chapters[row["paper"]]) for row in rows)
+    body = "\n".join(_ledger_row(row, by_key[row["paper"]]) for row in rows)
     return (
         "---\nhtml_theme.sidebar_secondary.remove: true\n---\n\n(ledger)=\n# Ledger\n\n"
         f"All {len(rows)} claims of this edition: what is printed, what we compute, and the "
         "verdict that follows from the two. A number is *reproduced* when it is within the "
         "tolerance, $|\\text{ours} - \\text{printed}| \\le \\tau$, where $\\tau$ is half a unit of "
-        "the last printed digit unless a reason for another is given. "
-        "[Errata](errata.md) lists the corrections.\n\n"
+        "the last printed digit unless a [word](words) such as *about* or a reason says "
+        "otherwise. [Errata](errata.md) lists the corrections.\n\n"
+        "A *headline* is what abstract or conclusions rest on; headlines and *results* are "
+        "scored. An *input* is what the paper lists as given and an *identity* is true whatever "
+        "the data; both are checked and stand outside the score. A scored verdict that nothing "
+        "can turn would say nothing: beside each stands a change of the model under which it "
+        "flips, and how large the change may be before it does.\n\n"
         + _raw(
             f"{_filter(papers)}\n"
             '<table class="rcbook-ledger rcbook-full" role="table" aria-label="Claims">'
             f'<thead role="rowgroup"><tr role="row">{head}</tr></thead>'
             f'<tbody role="rowgroup">\n{body}\n</tbody></table>'
+        )
+        + "\n"
+        + words_table()
+    )
+
+
+def words_table() -> str:
+    """What unsharp words mean, as a section of the ledger page."""
+    rows = "".join(
+        f'<tr id="word-{key}"><th scope="row">{html.escape(", ".join(row.words))}</th>'
+        f"<td>{_math(row.means)}</td></tr>\n"
+        for key, row in ledger.WORDS.items()
+    )
+    return (
+        "(words)=\n## What the papers' words mean\n\n"
+        "Where a paper prints a word instead of a number, the word means the same in every "
+        "paper. The table was fixed before anything was computed.\n\n"
+        + _raw(
+            '<div class="rcbook-wide" tabindex="0" role="region" aria-label="Words">'
+            '<table class="rcbook-words"><thead><tr><th scope="col">Words</th>'
+            f'<th scope="col">Meaning</th></tr></thead><tbody>{rows}</tbody></table></div>'
         )
     )
 
@@ -86,41 +151,45 @@ def ledger_page(papers: Sequence[ledger.Paper], rows: Sequence[Mapping]) -> str:
 def _filter(papers: Sequence[ledger.Paper]) -> str:
     """The filter's form, hidden until our script shows it."""
 
-    def select(name: str, values: Iterable[str]) -> str:
-        options = "".join(f"<option>{html.escape(value)}</option>" for value in values)
+    def select(name: str, values: Iterable[str], also: str = "") -> str:
+        options = also + "".join(f"<option>{html.escape(value)}</option>" for value in values)
         return (
             f'<label>{name.capitalize()} <select name="{name}">'
             f'<option value="">all</option>{options}</select></label>'
         )
 
+    groups = '<option value="scored">headline or result</option>'
+    groups += '<option value="outside">input or identity</option>'
     return (
         '<form class="rcbook-filter" role="search" aria-label="Filter the claims" hidden>'
         f"{select('paper', [paper.key for paper in papers])}{select('verdict', ledger.VERDICTS)}"
+        f"{select('role', ledger.ROLES, groups)}"
         '<label>Text <input type="search" name="text" autocomplete="off"></label>'
         '<button type="reset">Show all</button>'
         '<output role="status"></output></form>'
     )
 
 
-def _ledger_row(row: Mapping, chapter: str) -> str:
+def _ledger_row(row: Mapping, paper: ledger.Paper) -> str:
     id = html.escape(row["id"])
     claim = (
         f"{_math(row['says'])}<br><small>{_math(row['where'])} · "
-        f'<a href="{chapter}">{html.escape(row["notebook"])}</a> · '
+        f'<a href="{_chapter(paper)}">{html.escape(row["notebook"])}</a> · '
         f'<a href="#{id}"><code>{id}</code></a></small>'
     )
     cells = (
         claim,
         _math(ledger.show_printed(row)),
         _math(ledger.show_value(row["computed"])),
-        _tolerance(row),
-        _verdict(row),
+        _tolerance(row) + _flips(row),
+        _verdict(row, paper),
         _math(row["reason"]),
     )
     labelled = zip(_COLUMNS, cells, strict=True)
     tds = "".join(f'<td role="cell" data-label="{name}">{cell}</td>' for name, cell in labelled)
     return (
         f'<tr role="row" id="{id}" data-paper="{html.escape(row["paper"])}" '
+        f'data-role="{" ".join(roles(row))}" '
         f'data-verdict="{html.escape(row["verdict"])}">{tds}</tr>'
     )
 
@@ -135,15 +204,31 @@ def _tolerance(row: Mapping) -> str:
     return f"{shown}<br><small>{_math(reason)}</small>" if reason else shown
 
 
-def _verdict(row: Mapping) -> str:
+def _flips(row: Mapping) -> str:
+    """The change that turns the verdict, and how large it may be, for the tolerance column."""
+    margin = row["margin"]
+    if margin:
+        keeps, flips = (_size(margin[name], margin["unit"]) for name in ("keeps", "flips"))
+        how = f"holds at {keeps}, not at {flips}" if margin["keeps"] else f"not at {flips}"
+        return f"<br><small>flips with {_math(margin['what'])}: {how}</small>"
+    return f"<br><small>flips with {_math(row['flips_under'])}</small>" * bool(row["flips_under"])
+
+
+def _size(size: float, unit: str) -> str:
+    return f"{100 * size:.3g} %" if unit == "relative" else f"{size:.3g} {html.escape(unit)}"
+
+
+def _verdict(row: Mapping, paper: ledger.Paper) -> str:
     verdict = row["verdict"]
     shown = f'<span class="rcbook-verdict" data-verdict="{verdict}">{verdict}</span>'
+    shown += f"<br><small>{row['role']}</small>"
     if row["erratum"]:
         anchor = _anchor(row["paper"], row["erratum"])
         shown += f'<br><small><a href="errata.html#{anchor}">erratum</a></small>'
     elif verdict == ledger.CORRECTED:
         anchor = _anchor(row["paper"], f"reading-{row['reading']}")
-        shown += f'<br><small>reading <a href="errata.html#{anchor}">{row["reading"]}</a></small>'
+        title = _math(paper.conventions[row["reading"]]["title"])
+        shown += f'<br><small>reading: <a href="errata.html#{anchor}">{title}</a></small>'
     return shown
 
 
