@@ -46,10 +46,13 @@ def sizes(change: Mapping) -> list[float | None]:
     return sorted(change["sizes"]) if "sizes" in change else [None]
 
 
-def trials(paper: Paper, notebooks: Path, wanted: Iterable[tuple[str, float | None]]):
+def trials(
+    paper: Paper, notebooks: Path, wanted: Iterable[tuple[str, float | None]]
+) -> list[Trial]:
     """Run the notebook of `paper` under each wanted (change, size), side by side.
 
-    Raises ValueError for a change that the paper does not have.
+    The change `""` leaves the model as it is.
+    Raises ValueError for a change that the paper does not have, and for one that does not run.
     """
     wanted = list(wanted)
     if unknown := sorted({name for name, _ in wanted} - paper.changes.keys() - {""}):
@@ -64,15 +67,19 @@ def _trial(paper: Paper, notebooks: Path, name: str, size: float | None) -> Tria
     code = paper.changes[name]["apply"] if name else ""
     with tempfile.TemporaryDirectory(prefix="rcbook-", ignore_cleanup_errors=True) as scratch:
         job = json.dumps({"notebook": str(notebooks / paper.notebook), "apply": code, "size": size})
-        done = subprocess.run(
-            [sys.executable, "-m", "rcbook.falsify"],
-            input=job,
-            cwd=notebooks,
-            env=kernel_environment(Path(scratch)) | {"MPLBACKEND": "agg"},
-            capture_output=True,
-            encoding="utf-8",
-            timeout=LIMIT,
-        )
+        settings = {
+            "cwd": notebooks,
+            "env": kernel_environment(Path(scratch)) | {"MPLBACKEND": "agg"},
+            "encoding": "utf-8",
+            "timeout": LIMIT,
+        }
+        command = [sys.executable, "-m", "rcbook.falsify"]
+        try:
+            done = subprocess.run(command, input=job, capture_output=True, **settings)
+        except subprocess.TimeoutExpired:
+            raise ValueError(
+                f"change {name!r} of {paper.key} still runs after {LIMIT:g} s; make it smaller"
+            ) from None
     if done.returncode:
         raise ValueError(f"change {name!r} of {paper.key} does not run:\n{done.stderr[-3000:]}")
     return Trial(name, size, **json.loads(done.stdout.splitlines()[-1]))

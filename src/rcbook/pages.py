@@ -49,7 +49,7 @@ def _score(papers, rows, group: str, title: str, outside: bool) -> str:
     for paper in papers:
         own = [row for row in rows if row["paper"] == paper.key]
         tally = Counter(row["verdict"] for row in own if group in roles(row))
-        name = f'<a href="{_chapter(paper)}">{_math(paper.title)}</a>'
+        name = f'<a href="{_chapter(paper)}">{_math(_short(paper))}</a>'
         cells = "".join(_count(paper.key, v, group, tally[v]) for v in ledger.VERDICTS)
         cells += _count(paper.key, "", group, tally.total())
         if outside:
@@ -96,7 +96,7 @@ def idea_table(papers: Sequence[ledger.Paper]) -> str:
 
 def _idea(paper: ledger.Paper) -> str:
     idea = paper.idea
-    chapter = f"[{paper.title.partition(':')[0]}](notebooks/{paper.notebook})"
+    chapter = f"[{_short(paper)}](notebooks/{paper.notebook})"
     loop = f"{idea['loop']} {{cite}}`{idea['cite']}`"
     return f"| {chapter} | {loop} | {idea['index']} | {idea['period']} |\n"
 
@@ -139,7 +139,7 @@ def words_table() -> str:
     return (
         "(words)=\n## What the papers' words mean\n\n"
         "Where a paper prints a word instead of a number, the word means the same in every "
-        "paper. The table was fixed before anything was computed.\n\n"
+        "paper. The table was fixed before the verdicts of this edition were computed.\n\n"
         + _raw(
             '<div class="rcbook-wide" tabindex="0" role="region" aria-label="Words">'
             '<table class="rcbook-words"><thead><tr><th scope="col">Words</th>'
@@ -195,13 +195,15 @@ def _ledger_row(row: Mapping, paper: ledger.Paper) -> str:
 
 
 def _tolerance(row: Mapping) -> str:
-    tolerance = row["tolerance"]
+    tolerance, reason = row["tolerance"], _math(row["tolerance_reason"])
+    if row["word"]:
+        key = next(key for key, known in ledger.WORDS.items() if row["word"] in known.words)
+        reason = f'<a href="#word-{key}">{html.escape(row["word"])}</a>'
     if tolerance is None:
-        return "–"
+        return reason or "–"
     values = tolerance if isinstance(tolerance, list) else [tolerance]
     shown = "; ".join(f"±{value:g}" for value in dict.fromkeys(values))
-    reason = row.get("tolerance_reason")
-    return f"{shown}<br><small>{_math(reason)}</small>" if reason else shown
+    return f"{shown}<br><small>{reason}</small>" if reason else shown
 
 
 def _flips(row: Mapping) -> str:
@@ -292,6 +294,11 @@ def api_page() -> str:
 
 def _chapter(paper: ledger.Paper) -> str:
     return f"notebooks/{PurePosixPath(paper.notebook).stem}.html"
+
+
+def _short(paper: ledger.Paper) -> str:
+    """The title of a chapter up to its colon."""
+    return paper.title.partition(":")[0]
 
 
 def _anchor(paper: str, erratum: str) -> str:

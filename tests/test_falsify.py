@@ -1,0 +1,171 @@
+"""Every scored verdict can fail: a stated change of the model turns it, and here it is applied."""
+
+from dataclasses import replace
+
+import nbformat
+import pytest
+from conftest import ROOT
+
+from rcbook import falsify, ledger
+from rcbook.falsify import Trial
+from rcbook.ledger import Claim, Paper
+
+PAPERS = [ledger.load(key) for key in ledger.papers()]
+each = pytest.mark.parametrize("paper", PAPERS, ids=lambda paper: paper.key)
+
+
+# ---- the papers of the book ----
+
+
+@pytest.fixture(scope="module")
+def tried():
+    """Per paper the notebook as it is and under every change at its largest size."""
+    cache = {}
+
+    def tried(paper):
+        if paper.key not in cache:
+            largest = [(name, falsify.sizes(c)[-1]) for name, c in paper.changes.items()]
+            wanted = [("", None), *largest]
+            cache[paper.key] = falsify.trials(paper, ROOT / "notebooks", wanted)
+        return cache[paper.key]
+
+    return tried
+
+
+@each
+def test_without_a_change_every_verdict_is_the_expected_one(paper, tried):
+    plain = tried(paper)[0]
+    assert not plain.troubles
+    assert plain.verdicts == {id: claim.expected for id, claim in paper.claims.items()}
+
+
+@each
+def test_every_scored_verdict_flips_under_the_change_that_it_names(paper, tried):
+    lacking = falsify.unflipped(paper, tried(paper))
+    assert not lacking, "\n".join(lacking)
+
+
+@each
+def test_every_change_is_named_by_a_claim(paper):
+    named = {claim.flips_under for claim in paper.claims.values()}
+    assert set(paper.changes) <= named
+
+
+@each
+def test_stored_margins_are_of_scored_claims_and_known_changes(paper):
+    for id, margin in paper.margins.items():
+        assert paper.claims[id].role in ledger.SCORED
+        assert margin["what"] == paper.changes[margin["change"]]["what"]
+        assert margin["flips"] in paper.changes[margin["change"]]["sizes"]
+        assert margin["keeps"] < margin["flips"]
+
+
+@each
+def test_every_computed_number_has_a_margin(paper):
+    """How far the most telling parameter may move is known for each number of the score."""
+    for claim in paper.claims.values():
+        computed = claim.role in ledger.SCORED and claim.expected != ledger.NOT_COMPUTABLE
+        if computed and claim.kind == "number" and "sizes" in paper.changes[claim.flips_under]:
+            assert claim.id in paper.margins, claim.id
+
+
+# ---- the machinery, on a paper of one line ----
+
+
+CHANGE = "import math\nmath.pi = math.pi * (1 + size)"
+CODE = """import math
+from fake import ledger
+ledger.check("fake.area", math.pi)
+ledger.check("fake.mad", 1.0 / (math.pi < 3.2))
+ledger.check("fake.safe", 1.0)"""
+
+
+def paper(**changes):
+    claims = [
+        Claim(f"fake.{name}", "fake", "eq. 1", "number", "It.", printed, "1", "reproduced")
+        for name, printed in (("area", "3.14"), ("mad", "1"), ("safe", "1"))
+    ]
+    return Paper("fake", "Fake", "Nobody.", "one.ipynb", 1, {}, {}, {}, changes,
+                 {claim.id: claim for claim in claims})  # fmt: skip
+
+
+def named(what, **names):
+    claims = {id: replace(c, flips_under=names.get(id[5:], "")) for id, c in what.claims.items()}
+    return replace(what, claims=claims)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    module = "from rcbook.ledger import Claim, Ledger, Paper\n"
+    module += "claims = {c: Claim(c, 'fake', 'x', 'number', 'It.', p, '1', 'reproduced')\n"
+    module += "  for c, p in (('fake.area', '3.14'), ('fake.mad', '1'), ('fake.safe', '1'))}\n"
+    module += "ledger = Ledger(Paper('fake', 't', 'c', 'one.ipynb', 1, {}, {'primary': "
+    module += "{'title': 't', 'text': 't'}}, {}, {}, claims))\n"
+    (tmp_path / "fake.py").write_text(module, encoding="utf-8")
+    cells = [nbformat.v4.new_code_cell(CODE), nbformat.v4.new_code_cell("1 / 0")]
+    cells[1].metadata["tags"] = [falsify.SKIP]
+    nbformat.write(nbformat.v4.new_notebook(cells=cells), tmp_path / "one.ipynb")
+    return tmp_path
+
+
+GROW = {"what": "the ratio of a circle", "sizes": [0.001, 0.1, 0.0001], "apply": CHANGE}
+
+
+def test_a_change_turns_what_it_should_and_a_statement_that_fails_takes_no_other_with_it(folder):
+    here = named(paper(grow=GROW), area="grow", mad="grow", safe="grow")
+    plain, grown = falsify.trials(here, folder, [("", None), ("grow", 0.1)])
+    assert set(plain.verdicts.values()) == {"reproduced"} and not plain.troubles
+    assert grown.verdicts == {"fake.area": "not reproduced", "fake.safe": "reproduced"}
+    assert len(grown.troubles) == 1 and "ZeroDivisionError" in grown.troubles[0]
+    assert falsify.unflipped(here, [grown]) == [
+        "fake.mad: not reached under 'grow'",
+        "fake.safe: still reproduced under 'grow'",
+    ]
+
+
+def test_margins_bracket_the_size_that_flips(folder):
+    """3.1416 leaves 3.135 .. 3.145 when it grows by 0.108 percent."""
+    here = named(paper(grow=GROW), area="grow", mad="grow", safe="grow")
+    tried = falsify.trials(here, folder, [("grow", size) for size in falsify.sizes(GROW)])
+    assert falsify.margins(here, tried) == {
+        "fake.area": {
+            "change": "grow",
+            "what": "the ratio of a circle",
+            "unit": "relative",
+            "keeps": 0.001,
+            "flips": 0.1,
+        }
+    }
+
+
+def test_the_change_that_flips_first_is_the_most_telling():
+    here = paper(a={"what": "a", "sizes": [0.1]}, b={"what": "b", "sizes": [0.01]})
+    tried = [
+        Trial(n, s, {"fake.area": "not reproduced"}, {}, ()) for n, s in (("a", 0.1), ("b", 0.01))
+    ]
+    assert falsify.margins(here, tried)["fake.area"]["change"] == "b"
+
+
+def test_a_claim_without_a_change_is_told_apart_from_one_whose_change_was_not_tried():
+    here = named(paper(grow=GROW), area="grow")
+    problems = falsify.unflipped(here, [])
+    assert problems[0] == "fake.area: its change 'grow' was not tried"
+    assert "is it an identity?" in problems[1]
+
+
+def test_an_identity_and_what_cannot_be_computed_need_no_change():
+    here = paper()
+    roles = ("identity", "input", "result")
+    claims = {
+        id: replace(c, role=role) for (id, c), role in zip(here.claims.items(), roles, strict=True)
+    }
+    claims["fake.safe"] = replace(claims["fake.safe"], expected=ledger.NOT_COMPUTABLE)
+    assert not falsify.unflipped(replace(here, claims=claims), [])
+
+
+def test_an_unknown_change_and_one_that_does_not_run_are_refused(folder):
+    with pytest.raises(ValueError, match=r"no change shrink"):
+        falsify.trials(paper(), folder, [("shrink", None)])
+    broken = paper(broken={"what": "w", "apply": "import nowhere"})
+    with pytest.raises(ValueError, match=r"(?s)'broken'.*does not run.*nowhere"):
+        falsify.trials(broken, folder, [("broken", None)])
