@@ -348,6 +348,73 @@ def test_a_malformed_file_is_a_value_error_naming_the_claim_or_file(folder, old,
         ledger.load("paper")
 
 
+# ---- roles and words ----
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('role = "headline"\n', "", "lacks role"),
+        ('role = "headline"', 'role = "title"', "role 'title' is none of headline"),
+        ('flips_under = "gain"', 'flips_under = "grain"', r"'grain' is not in \[changes\]"),
+        ('role = "headline"', 'role = "input"', "an input has no verdict to flip"),
+        ('flips_under = "gain"', 'word = "roughly"', r"'roughly' is not in words\.toml"),
+        (
+            'flips_under = "gain"',
+            'word = "about"\ntolerance = 0.1\ntolerance_reason = "so"',
+            "a word and a tolerance of its own",
+        ),
+        ("chapter = 1\n", "", r"lacks chapter"),
+    ],
+)
+def test_roles_changes_and_words_are_known_ones(folder, old, new, message):
+    assert old in GOOD
+    folder(GOOD.replace(old, new, 1))
+    with pytest.raises(ValueError, match=message):
+        ledger.load("paper")
+
+
+def test_one_table_says_what_a_word_means_in_every_paper():
+    """Ten percent of what is printed for about; the error of a root finder for a theorem."""
+    about = claim(printed="500", word="about")
+    assert judge(about, 549.9).verdict == ledger.REPRODUCED
+    assert judge(about, 550.1).verdict == ledger.NOT_REPRODUCED
+    coarse = claim(printed="2", word="about")  # never finer than the digits that are printed
+    assert judge(coarse, 2.45).verdict == ledger.REPRODUCED
+    range_ = bound("0<k<2", word="theorem")
+    assert judge(range_, [0.0, 2 + 0.9e-6]).verdict == ledger.REPRODUCED
+    assert judge(range_, [0.0, 2 + 1.1e-6]).verdict == ledger.NOT_REPRODUCED
+
+
+def test_a_word_gives_its_number_and_one_that_has_none_is_refused():
+    assert ledger.word("hardly") == ledger.word("slight") == 0.1
+    assert ledger.word("significant") == 2.0
+    for name in ("satisfactory", "roughly"):
+        with pytest.raises(ValueError, match=f"no number is declared for the word '{name}'"):
+            ledger.word(name)
+
+
+def test_no_word_stands_in_two_rows():
+    names = [name for row in ledger.WORDS.values() for name in row.words]
+    assert len(names) == len(set(names))
+
+
+def test_marks_of_numbers_are_not_shown(folder):
+    folder(GOOD.replace("it takes {value:.2f} s", "it takes 3 s<!-- paper: p. 2 -->, {value:.1f}"))
+    book = Ledger.of("paper")
+    assert book.check("paper.b", 1.25).reason == "it takes 3 s, 1.2"
+
+
+def test_a_value_and_its_evidence_can_be_asked_for(folder):
+    book = Ledger.of("paper")
+    book.check("paper.b", 1.25, other=3.5)
+    assert book.value("paper.b") == 1.25 and book.value("paper.b", "other") == 3.5
+    with pytest.raises(ValueError, match=r"paper\.a is not judged yet"):
+        book.value("paper.a")
+    with pytest.raises(ValueError, match="no evidence 'late'; it has other"):
+        book.value("paper.b", "late")
+
+
 # ---- the ledger ----
 
 
@@ -364,10 +431,12 @@ def test_rows_come_in_the_order_of_the_paper_with_the_contract_fields(folder):
     first, second = filled(folder).rows()
     assert (first["id"], second["id"]) == ("paper.a", "paper.b")
     contract = "id paper where says printed unit computed verdict expected_verdict tolerance"
-    contract += " convention reason erratum notebook"
+    contract += " convention reason erratum notebook kind reading tolerance_reason evidence role"
+    contract += " flips_under"
     assert set(contract.split()) <= set(first)
     assert first["computed"] == 0.8373150978123456 and first["tolerance"] == 0.005
-    assert first["convention"] == "as printed"
+    assert first["convention"] == "as printed" and first["role"] == "headline"
+    assert first["flips_under"] == "the gain" and second["flips_under"] == ""
     assert second["verdict"] == second["expected_verdict"] == "not reproduced"
     assert second["reason"] == "it takes 1.25 s"
 
