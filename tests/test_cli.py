@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 
+import nbformat
 import pytest
 from conftest import COVER, LEDGER
 
@@ -19,6 +20,10 @@ def at(make, monkeypatch):
         monkeypatch.chdir(made.root)
         monkeypatch.setattr(project, "find", lambda start: made)
         monkeypatch.setattr(ledger, "papers", lambda: ("fake", "other"))
+        nothing = dict.fromkeys(("errata", "conventions", "changes"), {})
+        idea = dict.fromkeys(("loop", "index", "period"), "")
+        fields = {"claims": [], "idea": idea, "title": "", **nothing}
+        monkeypatch.setattr(ledger, "source", lambda key: fields)
         return made
 
     return at
@@ -29,12 +34,15 @@ def test_check_and_ledger(at, capsys):
     assert cli.main(["check"]) == 0
     said = capsys.readouterr().out
     assert "one.ipynb: done after" in said
-    assert "3 claims: 1 reproduced, 1 reproduced with correction, 0 not reproduced" in said
+    counted = (
+        "3 claims, 3 of them results (0 headlines): 1 reproduced, 1 reproduced with correction"
+    )
+    assert counted in said
     assert cli.main(["ledger"]) == 0
     said = capsys.readouterr().out
     assert "fake.x" in said
     assert "2.01" in said
-    assert "3 claims:" in said
+    assert counted in said
     assert cli.main(["ledger", "--json"]) == 0
     assert capsys.readouterr().out == made.ledger_file.read_text(encoding="utf-8")
     assert cli.main(["ledger", "--json", "--paper", "other"]) == 0
@@ -77,14 +85,15 @@ def test_no_ledger_yet(at, capsys):
 
 def test_wrong_use_is_status_2(at, capsys):
     at(one=[LEDGER])
-    assert cli.main(["ledger", "--paper", "nobody"]) == 2
-    assert "no paper 'nobody'; choose one of fake, other" in capsys.readouterr().err
+    for command in ("ledger", "falsify"):
+        assert cli.main([command, "--paper", "nobody"]) == 2
+        assert "no paper 'nobody'; choose one of fake, other" in capsys.readouterr().err
     with pytest.raises(SystemExit) as stop:
         cli.main(["bake"])
     assert stop.value.code == 2
 
 
-@pytest.mark.parametrize("command", ["build", "check", "ledger"])
+@pytest.mark.parametrize("command", ["build", "check", "ledger", "numbers", "falsify"])
 def test_outside_of_a_clone_there_is_one_clear_line(tmp_path, monkeypatch, capsys, command):
     monkeypatch.chdir(tmp_path)
     assert cli.main([command]) == 1
@@ -105,3 +114,27 @@ def test_help_does_not_wait_for_heavy_imports():
 def test_long_lists_are_shown_by_their_ends():
     assert ledger.show_value([3.0, -1.5, *[0.0] * 20]) == "-1.5 to 3 (22 values)"
     assert ledger.show_value([1.0, 2.0]) == "1; 2"
+
+
+def test_numbers_says_what_it_counted_and_fails_when_one_is_left(at, capsys):
+    made = at(one=[LEDGER])
+    (made.book / "index.md").write_text("# A book\n\nIn eq. 3 a gain of 7.\n", encoding="utf-8")
+    assert cli.main(["numbers", "--file", "index.md"]) == 1
+    said = capsys.readouterr().out
+    assert "UNACCOUNTED index.md, text: 7" in said
+    assert said.splitlines()[-1] == "2 numbers in the text, 1 unaccounted"
+    (made.book / "index.md").write_text("# A book\n\nIn eq. 3.\n", encoding="utf-8")
+    assert cli.main(["numbers", "--file", "index.md"]) == 0
+
+
+def test_numbers_are_rewritten_by_one_command(at, capsys):
+    made = at(one=["x = 2.04", LEDGER])
+    path = made.notebooks / "one.ipynb"
+    notebook = nbformat.read(path, as_version=4)
+    notebook.cells[0].source = "# The case one\n\nIt is 2.1<!-- {x:.1f} -->."
+    nbformat.write(notebook, path)
+    assert cli.main(["check"]) == 1
+    assert "the text says 2.1, and {x} is 2.0" in capsys.readouterr().out
+    assert cli.main(["numbers", "--file", "one.ipynb", "--rewrite"]) == 0
+    assert "1 numbers rewritten" in capsys.readouterr().out
+    assert cli.main(["check"]) == 0

@@ -1,5 +1,6 @@
 """Every scored verdict can fail: a stated change of the model turns it, and here it is applied."""
 
+import math
 from dataclasses import replace
 
 import nbformat
@@ -58,6 +59,7 @@ def test_stored_margins_are_of_scored_claims_and_known_changes(paper):
         assert margin["what"] == paper.changes[margin["change"]]["what"]
         assert margin["flips"] in paper.changes[margin["change"]]["sizes"]
         assert margin["keeps"] < margin["flips"]
+        assert margin["about"] is None or margin["keeps"] <= margin["about"] <= margin["flips"]
 
 
 @each
@@ -124,18 +126,26 @@ def test_a_change_turns_what_it_should_and_a_statement_that_fails_takes_no_other
 
 
 def test_margins_bracket_the_size_that_flips(folder):
-    """3.1416 leaves 3.135 .. 3.145 when it grows by 0.108 percent."""
+    """pi leaves 3.135 .. 3.145 when it grows to 3.145; the number is linear in the size."""
     here = named(paper(grow=GROW), area="grow", mad="grow", safe="grow")
     tried = falsify.trials(here, folder, [("grow", size) for size in falsify.sizes(GROW)])
-    assert falsify.margins(here, tried) == {
-        "fake.area": {
-            "change": "grow",
-            "what": "the ratio of a circle",
-            "unit": "relative",
-            "keeps": 0.001,
-            "flips": 0.1,
-        }
+    margin = falsify.margins(here, tried)["fake.area"]
+    assert margin.pop("about") == pytest.approx(3.145 / math.pi - 1, rel=1e-9)
+    assert margin == {
+        "change": "grow",
+        "what": "the ratio of a circle",
+        "unit": "relative",
+        "keeps": 0.001,
+        "flips": 0.1,
     }
+
+
+def test_a_margin_below_the_smallest_size_is_measured_from_the_unchanged_model(folder):
+    grow = GROW | {"sizes": [0.1]}
+    here = named(paper(grow=grow), area="grow")
+    margin = falsify.margins(here, falsify.trials(here, folder, [("", None), ("grow", 0.1)]))
+    assert margin["fake.area"]["keeps"] == 0.0
+    assert margin["fake.area"]["about"] == pytest.approx(3.145 / math.pi - 1, rel=1e-9)
 
 
 def test_the_change_that_flips_first_is_the_most_telling():

@@ -91,25 +91,26 @@ def _falsify(arguments: argparse.Namespace) -> int:
     from rcbook import falsify, ledger
     from rcbook.project import find
 
+    if not _known(arguments.paper):
+        return USAGE
     project = find(Path.cwd())
     keys = (arguments.paper,) if arguments.paper else ledger.papers()
     problems = shown = 0
     for paper in map(ledger.load, keys):
         names = [arguments.change] if arguments.change else list(paper.changes)
-        wanted = [
-            (name, size)
-            for name in names
-            for size in falsify.sizes(paper.changes.get(name, {}))[0 if arguments.measure else -1 :]
-        ]
+        first = 0 if arguments.measure else -1  # all sizes, or the largest
+        wanted = [("", None)] if not arguments.change else []
+        for name in names:
+            wanted += [(name, size) for size in falsify.sizes(paper.changes.get(name, {}))[first:]]
         tried = falsify.trials(paper, project.notebooks, wanted)
         for trial in tried:
-            expected = {id: claim.expected for id, claim in paper.claims.items()}
-            turned = [id for id, verdict in trial.verdicts.items() if verdict != expected[id]]
-            print(f"{paper.key}: {trial.change} {trial.size or ''} turns {len(turned)} verdicts")
-            print("".join(f"    {id}\n" for id in turned), end="")
+            turned = [id for id, v in trial.verdicts.items() if v != paper.claims[id].expected]
+            head = f"{trial.change or 'no change'} {trial.size or ''}".strip()
+            print(f"{paper.key}, {head}: {len(turned)} verdicts turned: {', '.join(turned)}")
             print("".join(f"    failed: {trouble}\n" for trouble in trial.troubles), end="")
         if arguments.change:
             continue
+        print(falsify.listing(paper, tried))
         lacking = falsify.unflipped(paper, tried)
         print("".join(f"UNFLIPPED {problem}\n" for problem in lacking), end="")
         problems += len(lacking)
@@ -143,9 +144,7 @@ def _ledger(arguments: argparse.Namespace) -> int:
     from rcbook import ledger
     from rcbook.project import find
 
-    if arguments.paper not in (None, *ledger.papers()):
-        known = ", ".join(ledger.papers())
-        print(f"rcbook: no paper {arguments.paper!r}; choose one of {known}", file=sys.stderr)
+    if not _known(arguments.paper):
         return USAGE
     file = find(Path.cwd()).ledger_file
     if not file.is_file():
@@ -157,6 +156,17 @@ def _ledger(arguments: argparse.Namespace) -> int:
     else:
         _print_table(rows)
     return OK
+
+
+def _known(paper: str | None) -> bool:
+    """Whether `paper` is the key of a paper, or none was asked for; says so if not."""
+    from rcbook import ledger
+
+    known = ledger.papers()
+    if paper in (None, *known):
+        return True
+    print(f"rcbook: no paper {paper!r}; choose one of {', '.join(known)}", file=sys.stderr)
+    return False
 
 
 def _print_table(rows: Sequence[dict]) -> None:

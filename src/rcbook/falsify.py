@@ -116,6 +116,21 @@ def run_cells(notebook: Path, apply: str, size: float | None) -> dict:
     }
 
 
+def listing(paper: Paper, tried: Sequence[Trial]) -> str:
+    """A line for every scored claim that can be computed: its verdict, and what it turns to under
+    which change."""
+    largest = {trial.change: trial for trial in sorted(tried, key=lambda t: t.size or 0.0)}
+    lines = []
+    for claim in paper.claims.values():
+        trial = largest.get(claim.flips_under)
+        if claim.flips_under and trial:
+            turned = trial.verdicts.get(claim.id, "not reached")
+            what = paper.changes[claim.flips_under]["what"]
+            size = f" ({trial.size:g})" if trial.size else ""
+            lines.append(f"{claim.id}: {claim.expected} -> {turned} with {what}{size}")
+    return "\n".join(lines)
+
+
 def _rows(space: Mapping) -> Iterable[Mapping]:
     for item in space.values():
         if isinstance(item, Ledger):
@@ -147,10 +162,11 @@ def unflipped(paper: Paper, tried: Sequence[Trial]) -> list[str]:
 def margins(paper: Paper, tried: Sequence[Trial]) -> dict[str, dict]:
     """How far the most telling parameter may move before each scored verdict flips.
 
-    For every claim the change that flips it at the smallest size: the largest size at which all
-    smaller ones kept the verdict too, and the one at which it flipped.
+    For every claim the change that flips it at the smallest size: the largest size before it, the
+    one at which it flipped, and for a number the size between at which it leaves its tolerance.
     """
     found: dict[str, dict] = {}
+    plain = next((trial for trial in tried if not trial.change), None)
     for name, change in paper.changes.items():
         series = sorted((t for t in tried if t.change == name and t.size), key=lambda t: t.size)
         for claim in paper.claims.values():
@@ -160,15 +176,36 @@ def margins(paper: Paper, tried: Sequence[Trial]) -> dict[str, dict]:
             flips = next((t for t in reached if t.verdicts[claim.id] != claim.expected), None)
             if flips is None or flips.size >= found.get(claim.id, {}).get("flips", float("inf")):
                 continue
-            kept = [t.size for t in reached if t.size < flips.size]
+            kept = [t for t in reached if t.size < flips.size]
+            last = kept[-1] if kept else plain
             found[claim.id] = {
                 "change": name,
                 "what": change["what"],
                 "unit": change.get("unit", "relative"),
-                "keeps": max(kept, default=0.0),
+                "keeps": kept[-1].size if kept else 0.0,
                 "flips": flips.size,
+                "about": _crossing(claim, last, flips),
             }
     return found
+
+
+def _crossing(claim: ledger.Claim, kept: Trial | None, flips: Trial) -> float | None:
+    """The size at which a computed number crosses its tolerance, on the line between two trials.
+
+    None for what is no number, and where no number crosses.
+    """
+    tolerances = ledger.tolerances(claim)
+    if kept is None or tolerances is None or claim.kind == "bound":
+        return None
+    start, end = kept.size or 0.0, flips.size
+    rows = (claim.printed.split(";"), tolerances, kept.computed[claim.id], flips.computed[claim.id])
+    printed, tolerances, before, after = (x if isinstance(x, list) else [x] for x in rows)
+    crossings = []
+    for p, tolerance, a, b in zip(printed, tolerances, before, after, strict=True):
+        if isinstance(a, int | float) and isinstance(b, int | float) and a != b:
+            shares = ((float(p) + sign * tolerance - a) / (b - a) for sign in (-1, 1))
+            crossings += [start + share * (end - start) for share in shares if 0 <= share <= 1]
+    return min(crossings, default=None)
 
 
 def store(paper: Paper, found: Mapping[str, Mapping]) -> Path:

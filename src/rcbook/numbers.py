@@ -36,11 +36,9 @@ def survey(project: Project) -> list[Place]:
     found: list[Place] = []
     for path in sorted(project.notebooks.glob("*.ipynb")):
         found += _read(path.name, _cells(path), lambda text: prose.numbers(text, _of(printed)))
-    for paper in project.papers:
-        for at, text, quoted in _texts(paper.key):
-            found += _read(
-                f"{paper.key}.toml", [(at, text)], lambda t, q=quoted: prose.of_template(t, q)
-            )
+    for key in (paper.key for paper in project.papers):
+        for at, text, quoted in _texts(key):
+            found += _read(f"{key}.toml", [(at, text)], lambda t, q=quoted: prose.of_template(t, q))
     for path in sorted(project.book.glob("*.md")):
         text = path.read_text(encoding="utf-8")
         found += _read(path.name, [("text", text)], prose.numbers)

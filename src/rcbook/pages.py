@@ -212,6 +212,8 @@ def _flips(row: Mapping) -> str:
     if margin:
         keeps, flips = (_size(margin[name], margin["unit"]) for name in ("keeps", "flips"))
         how = f"holds at {keeps}, not at {flips}" if margin["keeps"] else f"not at {flips}"
+        if margin["about"]:
+            how = f"beyond {_size(margin['about'], margin['unit'])}"
         return f"<br><small>flips with {_math(margin['what'])}: {how}</small>"
     return f"<br><small>flips with {_math(row['flips_under'])}</small>" * bool(row["flips_under"])
 
