@@ -20,7 +20,7 @@ def at(make, monkeypatch):
         monkeypatch.chdir(made.root)
         monkeypatch.setattr(project, "find", lambda start: made)
         monkeypatch.setattr(ledger, "papers", lambda: ("fake", "other"))
-        nothing = dict.fromkeys(("errata", "conventions", "changes"), {})
+        nothing = {part: {} for part in ("errata", "conventions", "changes")}
         idea = dict.fromkeys(("loop", "index", "period"), "")
         fields = {"claims": [], "idea": idea, "title": "", **nothing}
         monkeypatch.setattr(ledger, "source", lambda key: fields)
