@@ -13,8 +13,8 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from rcbook import pages
-from rcbook.project import Project
+from rcbook.book.project import Project
+from rcbook.ledger import show
 
 ROOT = Path(__file__).parents[1]
 
@@ -109,7 +109,7 @@ def built(tmp_path_factory) -> Path:
 def rows(built, request) -> list[dict]:
     """The ledger of the built book."""
     rows = json.loads((built / "book" / "_build" / "ledger.json").read_text(encoding="utf-8"))
-    request.config.stash[_COUNTS] = pages.counts(rows)
+    request.config.stash[_COUNTS] = show.counts(rows)
     return rows
 
 

@@ -48,7 +48,7 @@ def test_every_notebook_has_its_place_among_the_chapters(built):
 
 
 def test_the_ledger_is_what_its_schema_says(rows):
-    schema = json.loads(resources.files("rcbook").joinpath("ledger.schema.json").read_text())
+    schema = json.loads(resources.files("rcbook.ledger").joinpath("schema.json").read_text())
     jsonschema.validate(rows, schema)
     for spoiled in ({"role": "guess"}, {"verdict": "fine"}, {"computed": "3"}, {"colour": "red"}):
         with pytest.raises(jsonschema.ValidationError):

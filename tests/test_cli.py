@@ -8,7 +8,9 @@ import nbformat
 import pytest
 from conftest import COVER, LEDGER
 
-from rcbook import cli, ledger, project, render, run
+from rcbook import cli, ledger
+from rcbook.book import project, render, run
+from rcbook.ledger import show
 
 
 @pytest.fixture
@@ -112,8 +114,8 @@ def test_help_does_not_wait_for_heavy_imports():
 
 
 def test_long_lists_are_shown_by_their_ends():
-    assert ledger.show_value([3.0, -1.5, *[0.0] * 20]) == "-1.5 to 3 (22 values)"
-    assert ledger.show_value([1.0, 2.0]) == "1; 2"
+    assert show.value([3.0, -1.5, *[0.0] * 20]) == "-1.5 to 3 (22 values)"
+    assert show.value([1.0, 2.0]) == "1; 2"
 
 
 def test_numbers_says_what_it_counted_and_fails_when_one_is_left(at, capsys):

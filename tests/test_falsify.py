@@ -7,8 +7,9 @@ import nbformat
 import pytest
 from conftest import ROOT
 
-from rcbook import falsify, ledger
-from rcbook.falsify import Trial
+from rcbook import ledger
+from rcbook.book import falsify
+from rcbook.book.falsify import Trial
 from rcbook.ledger import Claim, Paper
 
 PAPERS = [ledger.load(key) for key in ledger.papers()]

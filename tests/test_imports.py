@@ -9,11 +9,11 @@ import rcbook
 
 PACKAGE = Path(rcbook.__file__).parent
 LAYERS = (
-    {"zdomain", "signals", "ledger", "prose"},
+    {"zdomain", "signals", "ledger"},
     {"identify", "repetitive", "learning", "periodic"},
     {"machines"},
     {"plot", "diagrams"},
-    {"project", "pages", "run", "render", "falsify", "numbers", "cli"},
+    {"book", "cli"},
 )
 APART = ({"machines"}, {"identify", "repetitive", "learning", "periodic"})
 MATHEMATICS = set().union(*LAYERS[:3])

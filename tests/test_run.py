@@ -12,7 +12,8 @@ import nbformat
 import pytest
 from conftest import COVER, LEDGER, alive
 
-from rcbook import ledger, render, run
+from rcbook import ledger
+from rcbook.book import render, run
 
 PID = "import os\nopen('pid', 'w').write(str(os.getpid()))"
 

@@ -63,15 +63,15 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _check(_) -> int:
-    from rcbook import run
-    from rcbook.project import find
+    from rcbook.book import run
+    from rcbook.book.project import find
 
     return OK if run.check(find(Path.cwd())).ok else FAILED
 
 
 def _build(_) -> int:
-    from rcbook import render, run
-    from rcbook.project import find
+    from rcbook.book import render, run
+    from rcbook.book.project import find
 
     project = find(Path.cwd())
     judged = run.check(project)
@@ -88,8 +88,9 @@ def _build(_) -> int:
 
 
 def _falsify(arguments: argparse.Namespace) -> int:
-    from rcbook import falsify, ledger
-    from rcbook.project import find
+    from rcbook import ledger
+    from rcbook.book import falsify
+    from rcbook.book.project import find
 
     if not _known(arguments.paper):
         return USAGE
@@ -122,18 +123,19 @@ def _falsify(arguments: argparse.Namespace) -> int:
 
 
 def _numbers(arguments: argparse.Namespace) -> int:
-    from rcbook import numbers, prose, run
-    from rcbook.project import find
+    from rcbook.book import execute, numbers, run
+    from rcbook.book.project import find
+    from rcbook.ledger import marks
 
     project = find(Path.cwd())
     if arguments.rewrite:
         paths = sorted(project.notebooks.glob(arguments.file or "*.ipynb"))
-        _, failures, typed = run.execute(paths)
+        _, failures, typed = execute.execute(paths)
         for failure in failures:
             print(f"{failure.notebook}, {failure.cell}: {run.plain(failure.what)}")
         print(f"{numbers.rewrite(project, typed)} numbers rewritten")
     places = [p for p in numbers.survey(project) if arguments.file in (None, p.file)]
-    lost = [place for place in places if place.number.kind == prose.UNACCOUNTED]
+    lost = [place for place in places if place.number.kind == marks.UNACCOUNTED]
     print("".join(f"UNACCOUNTED {place}\n" for place in lost), end="")
     print(numbers.table(places))
     print(f"\n{len(places)} numbers in the text, {len(lost)} unaccounted")
@@ -142,7 +144,7 @@ def _numbers(arguments: argparse.Namespace) -> int:
 
 def _ledger(arguments: argparse.Namespace) -> int:
     from rcbook import ledger
-    from rcbook.project import find
+    from rcbook.book.project import find
 
     if not _known(arguments.paper):
         return USAGE
@@ -174,7 +176,7 @@ def _print_table(rows: Sequence[dict]) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from rcbook import ledger, pages
+    from rcbook.ledger import show
 
     table = Table(box=None, pad_edge=False)
     table.add_column("claim", min_width=max((len(row["id"]) for row in rows), default=5))
@@ -183,14 +185,14 @@ def _print_table(rows: Sequence[dict]) -> None:
     for row in rows:
         flip = "" if row["verdict"] == row["expected_verdict"] else " (NOT EXPECTED)"
         shown = (
-            ledger.show_printed(row),
-            ledger.show_value(row["computed"]),
+            show.printed(row),
+            show.value(row["computed"]),
             row["verdict"] + flip,
             row["reason"],
         )
         table.add_row(*(Text(cell) for cell in (row["id"], *shown)))  # brackets are no markup
     Console(width=None if sys.stdout.isatty() else 160).print(table)
-    print(f"\n{pages.counts(rows)}")
+    print(f"\n{show.counts(rows)}")
 
 
 if __name__ == "__main__":

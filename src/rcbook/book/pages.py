@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import pkgutil
-import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePosixPath
@@ -12,13 +11,10 @@ from urllib.parse import urlencode
 
 import rcbook
 from rcbook import ledger
+from rcbook.ledger import show
 
-_MACHINERY = tuple(
-    f"rcbook.{name}"
-    for name in ("run", "render", "pages", "cli", "project", "falsify", "numbers", "prose")
-)
+_MACHINERY = ("rcbook.book", "rcbook.cli")
 _COLUMNS = ("Claim", "Printed", "Ours", "Tolerance", "Verdict", "Reason")
-_MATH = re.compile(r"\$([^$]+)\$")
 
 
 def pages(papers: Sequence[ledger.Paper], rows: Sequence[Mapping]) -> dict[str, str]:
@@ -49,7 +45,7 @@ def _score(papers, rows, group: str, title: str, outside: bool) -> str:
     for paper in papers:
         own = [row for row in rows if row["paper"] == paper.key]
         tally = Counter(row["verdict"] for row in own if group in roles(row))
-        name = f'<a href="{_chapter(paper)}">{_math(_short(paper))}</a>'
+        name = f'<a href="{_chapter(paper)}">{show.math(_short(paper))}</a>'
         cells = "".join(_count(paper.key, v, group, tally[v]) for v in ledger.VERDICTS)
         cells += _count(paper.key, "", group, tally.total())
         if outside:
@@ -67,19 +63,6 @@ def _score(papers, rows, group: str, title: str, outside: bool) -> str:
 def roles(row: Mapping) -> tuple[str, str]:
     """The role of a row and whether it is `scored` or `outside` the score."""
     return row["role"], "scored" if row["role"] in ledger.SCORED else "outside"
-
-
-def counts(rows: Iterable[Mapping]) -> str:
-    """`'5 results: 4 reproduced, ..., and 2 inputs and identities'` for ledger rows."""
-    rows = list(rows)
-    scored = [row for row in rows if row["role"] in ledger.SCORED]
-    tally = Counter(row["verdict"] for row in scored)
-    parts = ", ".join(f"{tally[verdict]} {verdict}" for verdict in ledger.VERDICTS)
-    headlines = sum(row["role"] == "headline" for row in scored)
-    return (
-        f"{len(rows)} claims, {len(scored)} of them results ({headlines} headlines): {parts}; "
-        f"{len(rows) - len(scored)} inputs and identities outside the score"
-    )
 
 
 def _count(paper: str, verdict: str, role: str, count: int) -> str:
@@ -111,7 +94,7 @@ def ledger_page(papers: Sequence[ledger.Paper], rows: Sequence[Mapping]) -> str:
         f"All {len(rows)} claims of this edition: what is printed, what we compute, and the "
         "verdict that follows from the two. A number is *reproduced* when it is within the "
         "tolerance, $|\\text{ours} - \\text{printed}| \\le \\tau$, where $\\tau$ is half a unit of "
-        "the last printed digit unless a [word](words) such as *about* or a reason says "
+        "the last printed digit unless a [word](unsharp-words) such as *about* or a reason says "
         "otherwise. [Errata](errata.md) lists the corrections.\n\n"
         "A *headline* is what abstract or conclusions rest on; headlines and *results* are "
         "scored. An *input* is what the paper lists as given and an *identity* is true whatever "
@@ -133,11 +116,11 @@ def words_table() -> str:
     """What unsharp words mean, as a section of the ledger page."""
     rows = "".join(
         f'<tr id="word-{key}"><th scope="row">{html.escape(", ".join(row.words))}</th>'
-        f"<td>{_math(row.means)}</td></tr>\n"
+        f"<td>{show.math(row.means)}</td></tr>\n"
         for key, row in ledger.WORDS.items()
     )
     return (
-        "(words)=\n## What the papers' words mean\n\n"
+        "(unsharp-words)=\n## What the papers' words mean\n\n"
         "Where a paper prints a word instead of a number, the word means the same in every "
         "paper. The table was fixed before the verdicts of this edition were computed.\n\n"
         + _raw(
@@ -173,17 +156,17 @@ def _filter(papers: Sequence[ledger.Paper]) -> str:
 def _ledger_row(row: Mapping, paper: ledger.Paper) -> str:
     id = html.escape(row["id"])
     claim = (
-        f"{_math(row['says'])}<br><small>{_math(row['where'])} · "
+        f"{show.math(row['says'])}<br><small>{show.math(row['where'])} · "
         f'<a href="{_chapter(paper)}">{html.escape(row["notebook"])}</a> · '
         f'<a href="#{id}"><code>{id}</code></a></small>'
     )
     cells = (
         claim,
-        _math(ledger.show_printed(row)),
-        _math(ledger.show_value(row["computed"])),
+        show.math(show.printed(row)),
+        show.math(show.value(row["computed"])),
         _tolerance(row) + _flips(row),
         _verdict(row, paper),
-        _math(row["reason"]),
+        show.math(row["reason"]),
     )
     labelled = zip(_COLUMNS, cells, strict=True)
     tds = "".join(f'<td role="cell" data-label="{name}">{cell}</td>' for name, cell in labelled)
@@ -195,7 +178,7 @@ def _ledger_row(row: Mapping, paper: ledger.Paper) -> str:
 
 
 def _tolerance(row: Mapping) -> str:
-    tolerance, reason = row["tolerance"], _math(row["tolerance_reason"])
+    tolerance, reason = row["tolerance"], show.math(row["tolerance_reason"])
     if row["word"]:
         key = next(key for key, known in ledger.WORDS.items() if row["word"] in known.words)
         reason = f'<a href="#word-{key}">{html.escape(row["word"])}</a>'
@@ -214,8 +197,10 @@ def _flips(row: Mapping) -> str:
         how = f"holds at {keeps}, not at {flips}" if margin["keeps"] else f"not at {flips}"
         if margin["about"]:
             how = f"beyond {_size(margin['about'], margin['unit'])}"
-        return f"<br><small>flips with {_math(margin['what'])}: {how}</small>"
-    return f"<br><small>flips with {_math(row['flips_under'])}</small>" * bool(row["flips_under"])
+        return f"<br><small>flips with {show.math(margin['what'])}: {how}</small>"
+    return f"<br><small>flips with {show.math(row['flips_under'])}</small>" * bool(
+        row["flips_under"]
+    )
 
 
 def _size(size: float, unit: str) -> str:
@@ -231,7 +216,7 @@ def _verdict(row: Mapping, paper: ledger.Paper) -> str:
         shown += f'<br><small><a href="errata.html#{anchor}">erratum</a></small>'
     elif verdict == ledger.CORRECTED:
         anchor = _anchor(row["paper"], f"reading-{row['reading']}")
-        title = _math(paper.conventions[row["reading"]]["title"])
+        title = show.math(paper.conventions[row["reading"]]["title"])
         shown += f'<br><small>reading: <a href="errata.html#{anchor}">{title}</a></small>'
     return shown
 
@@ -278,14 +263,14 @@ def _deciding(row: Mapping) -> str:
     return (
         f': <a href="ledger.html#{id}"><code>{id}</code></a> '
         f'<span class="rcbook-verdict" data-verdict="{row["verdict"]}">{row["verdict"]}</span>. '
-        f"<span>{_math(row['reason'])}</span>"
+        f"<span>{show.math(row['reason'])}</span>"
     )
 
 
 def api_page() -> str:
     """One section per module of the package, from its docstrings."""
     found = pkgutil.walk_packages(rcbook.__path__, "rcbook.")
-    names = [m.name for m in found if not m.ispkg and m.name not in _MACHINERY]
+    names = [m.name for m in found if not m.ispkg and not m.name.startswith(_MACHINERY)]
     sections = (
         f"## {name}\n\n```{{eval-rst}}\n.. automodule:: {name}\n"
         "   :members:\n   :member-order: bysource\n```\n"
@@ -305,12 +290,6 @@ def _short(paper: ledger.Paper) -> str:
 
 def _anchor(paper: str, erratum: str) -> str:
     return f"erratum-{paper}-{erratum}".replace("_", "-").lower()
-
-
-def _math(text: str) -> str:
-    """`text` escaped for HTML, its `$...$` marked for MathJax."""
-    mark = r'<span class="math notranslate nohighlight">\\(\1\\)</span>'
-    return _MATH.sub(mark, html.escape(text, quote=False))
 
 
 def _raw(text: str) -> str:

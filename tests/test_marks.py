@@ -4,12 +4,14 @@ import nbformat
 import pytest
 from conftest import COVER, LEDGER, ROOT
 
-from rcbook import numbers, prose, run
-from rcbook.project import find
+from rcbook.book import numbers
+from rcbook.book.execute import execute
+from rcbook.book.project import find
+from rcbook.ledger import marks
 
 
 def kinds(text, **settings):
-    return [(n.text, n.kind) for n in prose.numbers(text, **settings)]
+    return [(n.text, n.kind) for n in marks.numbers(text, **settings)]
 
 
 # ---- what counts as a number, and what accounts for it by itself ----
@@ -30,7 +32,7 @@ def kinds(text, **settings):
     ],
 )
 def test_numbers_are_found(text, found):
-    assert [n.text for n in prose.numbers(text)] == found
+    assert [n.text for n in marks.numbers(text)] == found
 
 
 @pytest.mark.parametrize(
@@ -49,8 +51,8 @@ def test_numbers_are_found(text, found):
     ],
 )
 def test_structure_needs_no_mark(text):
-    found = prose.numbers(text)
-    assert all(n.kind == prose.STRUCTURAL for n in found), found
+    found = marks.numbers(text)
+    assert all(n.kind == marks.STRUCTURAL for n in found), found
 
 
 @pytest.mark.parametrize(
@@ -58,36 +60,36 @@ def test_structure_needs_no_mark(text):
     ["a gain of 2", "$k = 0.5$", "$N = 3$", "N = 2000", "eq. 3 gives 7", "teeth: 24", "2000 rpm"],
 )
 def test_what_is_no_structure_has_to_be_accounted_for(text):
-    assert prose.numbers(text)[-1].kind == prose.UNACCOUNTED
+    assert marks.numbers(text)[-1].kind == marks.UNACCOUNTED
 
 
 def test_braces_check_as_many_numbers_before_them():
-    found = prose.numbers("In 9 runs $z^{-3}$ went from 1.5 to 2.5<!-- {a:.1f} {b[0]:.1f} -->.")
-    checked = [(n.text, n.expression, n.spec) for n in found if n.kind == prose.COMPUTED]
+    found = marks.numbers("In 9 runs $z^{-3}$ went from 1.5 to 2.5<!-- {a:.1f} {b[0]:.1f} -->.")
+    checked = [(n.text, n.expression, n.spec) for n in found if n.kind == marks.COMPUTED]
     assert checked == [("1.5", "a", ".1f"), ("2.5", "b[0]", ".1f")]
-    assert found[0].kind == prose.UNACCOUNTED
+    assert found[0].kind == marks.UNACCOUNTED
 
 
 def test_an_exponent_of_a_formula_is_not_what_a_mark_means():
-    found = prose.numbers(r"$0.25\,z^{-3}$<!-- {b:.2f} -->")
-    assert [n.kind for n in found] == [prose.COMPUTED, prose.STRUCTURAL]
+    found = marks.numbers(r"$0.25\,z^{-3}$<!-- {b:.2f} -->")
+    assert [n.kind for n in found] == [marks.COMPUTED, marks.STRUCTURAL]
 
 
 def test_a_quotation_goes_back_to_the_mark_before_and_not_beyond_its_paragraph():
     text = "7 in.\n\nA 3 and 4<!-- paper: ch. II -->, then 5<!-- chosen: an exercise --> and 6"
     assert [kind for _, kind in kinds(text)] == [
-        prose.UNACCOUNTED,
-        prose.QUOTED,
-        prose.QUOTED,
-        prose.CHOSEN,
-        prose.UNACCOUNTED,
+        marks.UNACCOUNTED,
+        marks.QUOTED,
+        marks.QUOTED,
+        marks.CHOSEN,
+        marks.UNACCOUNTED,
     ]
 
 
 def test_a_quoted_claim_has_to_print_the_number():
     printed = {"paper.a": "-2.5;47"}.__getitem__
     text = "{} lb<!-- claim: paper.a -->"
-    for value, kind in (("47", prose.QUOTED), ("2.5", prose.QUOTED), ("46", prose.UNACCOUNTED)):
+    for value, kind in (("47", marks.QUOTED), ("2.5", marks.QUOTED), ("46", marks.UNACCOUNTED)):
         assert kinds(text.format(value), printed=printed)[0][1] == kind
 
 
@@ -103,7 +105,7 @@ def test_a_quoted_claim_has_to_print_the_number():
 )
 def test_a_mark_that_says_nothing_is_refused(text, message):
     with pytest.raises(ValueError, match=message):
-        prose.numbers(text)
+        marks.numbers(text)
 
 
 @pytest.mark.parametrize(
@@ -124,28 +126,28 @@ def test_a_mark_that_says_nothing_is_refused(text, message):
     ],
 )
 def test_typed_and_computed_are_compared_digit_by_digit(typed, computed, same):
-    assert prose.same(typed, computed) is same
+    assert marks.same(typed, computed) is same
 
 
 def test_rewriting_keeps_the_way_of_writing():
     text = r"From −3.1 over $4\times10^{8}$<!-- {a:.1f} {b:.0e} --> on."
     values = {text.index("−"): "-2.9", text.index("4"): "5e+07"}
-    assert prose.rewritten(text, values) == (
+    assert marks.rewritten(text, values) == (
         r"From −2.9 over $5\times10^{7}$<!-- {a:.1f} {b:.0e} --> on."
     )
 
 
 def test_marks_are_gone_for_the_reader():
-    assert prose.without_marks("A 3.5<!-- {a:.1f} --> and\n<!-- paper: p. 2 -->b") == "A 3.5 and\nb"
+    assert marks.without_marks("A 3.5<!-- {a:.1f} --> and\n<!-- paper: p. 2 -->b") == "A 3.5 and\nb"
 
 
 def test_braces_of_a_data_file_are_computed_and_its_own_print_is_a_quotation():
-    found = prose.of_template("It is {value:.2e} lb, not 47, at 3 or $z^{{-4}}$.", ["47 lb"])
+    found = marks.of_template("It is {value:.2e} lb, not 47, at 3 or $z^{{-4}}$.", ["47 lb"])
     assert {n.text: n.kind for n in found} == {
-        "{value}": prose.COMPUTED,
-        "47": prose.QUOTED,
-        "3": prose.UNACCOUNTED,
-        "-4": prose.STRUCTURAL,
+        "{value}": marks.COMPUTED,
+        "47": marks.QUOTED,
+        "3": marks.UNACCOUNTED,
+        "-4": marks.STRUCTURAL,
     }
 
 
@@ -159,7 +161,7 @@ def executed(make, text, alt="a curve", cells=("x = 2.04", LEDGER, COVER)):
     notebook.cells.insert(1, nbformat.v4.new_markdown_cell(text))
     notebook.cells[-1].metadata["mystnb"]["image"]["alt"] = alt
     nbformat.write(notebook, path)
-    return project, *run.execute([path])
+    return project, *execute([path])
 
 
 def test_a_right_number_passes_even_where_it_stands_before_its_code(make):
@@ -202,5 +204,5 @@ def test_one_command_rewrites_the_numbers(make):
 
 
 def test_every_number_of_the_book_is_accounted_for():
-    lost = [str(p) for p in numbers.survey(find(ROOT)) if p.number.kind == prose.UNACCOUNTED]
+    lost = [str(p) for p in numbers.survey(find(ROOT)) if p.number.kind == marks.UNACCOUNTED]
     assert not lost, "\n".join(lost)

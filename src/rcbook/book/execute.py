@@ -1,15 +1,14 @@
-"""Execute every notebook once, judge every claim, keep the ledger of the run."""
+"""Execute notebooks, each once and side by side, and evaluate the numbers of their texts."""
 
 from __future__ import annotations
 
 import asyncio
 import os
-import re
 import sys
 import tempfile
 import time
 from ast import literal_eval
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
@@ -23,13 +22,10 @@ from nbclient import NotebookClient
 from nbclient.exceptions import CellExecutionError, DeadKernelError
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from rcbook import ledger, prose
-from rcbook.pages import counts
-from rcbook.project import Project
+from rcbook.ledger import marks
 
 LIMIT = 900.0  # s per notebook; the slowest honest one needs about a sixth on two processors
 
-_ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 # What a user's own set-up could leak into a kernel, and so into the verdicts.
 _LEAKS = ("MPLBACKEND", "MPLSTYLE", "PYTHONSTARTUP", "PYTHONWARNINGS", "PYTHONPATH")
 
@@ -46,32 +42,6 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Run:
-    """One execution of all notebooks and what it says about every claim."""
-
-    notebooks: Mapping[str, nbformat.NotebookNode]  # executed, by file name
-    failures: Sequence[Failure]
-    typed: Mapping[str, Sequence[Typed]]  # numbers of the text, by file name
-    rows: Sequence[Mapping] = ()  # of the ledger, papers in order, claims in the paper's order
-    missing: Sequence[str] = ()  # ids never computed
-
-    @property
-    def complete(self) -> bool:
-        """Whether every notebook ended well and every claim was computed."""
-        return not self.failures and not self.missing
-
-    @property
-    def flips(self) -> list[Mapping]:
-        """The rows whose verdict is not the expected one."""
-        return [row for row in self.rows if row["verdict"] != row["expected_verdict"]]
-
-    @property
-    def ok(self) -> bool:
-        """Whether the run is complete and every verdict the expected one."""
-        return self.complete and not self.flips
-
-
-@dataclass(frozen=True)
 class Typed:
     """A number of a notebook's text beside what the run computes for it."""
 
@@ -85,7 +55,7 @@ class Typed:
 
     @property
     def right(self) -> bool:
-        return prose.same(self.text, self.computed)
+        return marks.same(self.text, self.computed)
 
 
 @dataclass
@@ -111,33 +81,6 @@ class _Track:
 
 class _Stopped(Exception):
     """A cell ended without an error and is a failure all the same."""
-
-
-def check(project: Project, limit: float = LIMIT) -> Run:
-    """Execute (at most `limit` seconds per notebook), judge, say what came out, keep the ledger.
-
-    The ledger is kept only when every claim was computed.
-    Raises ValueError when the checkout has no notebook.
-    """
-    paths = sorted(project.notebooks.glob("*.ipynb"))
-    if not paths:
-        raise ValueError(f"no notebook in {project.notebooks}; put one there")
-    run = judge(project.papers, *execute(paths, limit))
-    if run.complete:
-        write(project.ledger_file, ledger.dumps(run.rows))
-    report(run)
-    return run
-
-
-def write(path: Path, text: str) -> None:
-    """Put `text` into `path` whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.name}-{os.getpid()}")
-    try:
-        beside.write_text(text, encoding="utf-8", newline="\n")
-        os.replace(beside, path)
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def execute(paths: Sequence[Path], limit: float = LIMIT):
@@ -285,13 +228,13 @@ async def _run_cells(notebook, folder: Path, environment: Mapping, track: _Track
         await ensure_async(manager.cleanup_resources())
 
 
-def to_check(cell: nbformat.NotebookNode) -> list[tuple[str, bool, prose.Number]]:
+def to_check(cell: nbformat.NotebookNode) -> list[tuple[str, bool, marks.Number]]:
     """The computed numbers of a cell's text or alternative text: cell id, which, number."""
     texts = [(True, alternative(cell))]
     if cell.cell_type == "markdown":
         texts.append((False, cell.source))
-    found = ((alt, number) for alt, text in texts for number in prose.numbers(text))
-    return [(cell.id, alt, n) for alt, n in found if n.kind == prose.COMPUTED]
+    found = ((alt, number) for alt, text in texts for number in marks.numbers(text))
+    return [(cell.id, alt, n) for alt, n in found if n.kind == marks.COMPUTED]
 
 
 def alternative(cell: nbformat.NotebookNode) -> str:
@@ -333,67 +276,3 @@ def _stderr(cell: nbformat.NotebookNode) -> str:
 def _say(progress: Progress, line: str) -> None:
     if progress.disable:  # not a terminal: no bars, so plain lines
         print(line, flush=True)
-
-
-def judge(
-    papers: Iterable[ledger.Paper],
-    notebooks: Mapping[str, nbformat.NotebookNode],
-    failures: Sequence[Failure],
-    typed: Mapping[str, Sequence[Typed]],
-) -> Run:
-    """Put the rows that executed notebooks show beside the claims of `papers`.
-
-    A later display overrides an earlier one of the same notebook.  Two notebooks that disagree
-    about a claim, and a claim that no paper has, are failures.
-    """
-    ids = [id for paper in papers for id in paper.claims]
-    shown: dict[str, tuple[str, Mapping]] = {}
-    failures = list(failures)
-    for name, notebook in notebooks.items():
-        for row in _rows(notebook):
-            id = row["id"]
-            if id not in ids:
-                failures.append(Failure(name, f"it judges {id}, which is no claim of any paper"))
-            elif id in shown and shown[id][0] != name and not _same(shown[id][1], row):
-                failures.append(Failure(name, f"it contradicts {shown[id][0]} about {id}"))
-            shown[id] = (name, row)
-    rows = [shown[id][1] for id in ids if id in shown]
-    return Run(notebooks, failures, typed, rows, [id for id in ids if id not in shown])
-
-
-def _rows(notebook: nbformat.NotebookNode) -> Iterable[Mapping]:
-    for cell in notebook.cells:
-        for output in cell.get("outputs", ()):
-            yield from output.get("data", {}).get(ledger.MIME, ())
-
-
-def _same(one: Mapping, other: Mapping) -> bool:
-    return one["verdict"] == other["verdict"]
-
-
-def report(run: Run) -> None:
-    """Print what a run came to: failures, claims never computed, flips, counts."""
-    for failure in run.failures:
-        head = ", ".join(part for part in (failure.notebook, failure.cell) if part)
-        print(f"\nFAILED {head}: {plain(failure.what)}")
-        if failure.source:
-            print("\n".join(f"    {line}" for line in failure.source.splitlines()))
-        if failure.detail:
-            print(plain(failure.detail).rstrip())
-    for id in run.missing:
-        print(f"NEVER COMPUTED {id}")
-    for row in run.flips:
-        print(
-            f"FLIPPED {row['id']}: printed {row['printed'] or '-'}, "
-            f"ours {ledger.show_value(row['computed'])}, verdict {row['verdict']}, "
-            f"expected {row['expected_verdict']}{': ' if row['reason'] else ''}{row['reason']}"
-        )
-    typed = [number for numbers in run.typed.values() for number in numbers]
-    wrong = sum(not number.right for number in typed)
-    print(f"\n{len(typed)} numbers of the text computed, {wrong} of them wrong")
-    print(f"{counts(run.rows)}; {len(run.missing)} never computed, {len(run.flips)} flipped")
-
-
-def plain(text: str) -> str:
-    """`text`, without colours unless it goes to a terminal."""
-    return text if sys.stdout.isatty() else _ANSI.sub("", text)

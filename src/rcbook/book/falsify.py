@@ -23,6 +23,7 @@ from datetime import date
 from importlib import metadata
 from pathlib import Path
 
+import rcbook
 from rcbook import ledger
 from rcbook.ledger import Ledger, Paper
 
@@ -62,7 +63,7 @@ def trials(
 
 
 def _trial(paper: Paper, notebooks: Path, name: str, size: float | None) -> Trial:
-    from rcbook.run import kernel_environment
+    from rcbook.book.execute import kernel_environment
 
     code = paper.changes[name]["apply"] if name else ""
     with tempfile.TemporaryDirectory(prefix="rcbook-", ignore_cleanup_errors=True) as scratch:
@@ -73,7 +74,7 @@ def _trial(paper: Paper, notebooks: Path, name: str, size: float | None) -> Tria
             "encoding": "utf-8",
             "timeout": LIMIT,
         }
-        command = [sys.executable, "-m", "rcbook.falsify"]
+        command = [sys.executable, "-m", "rcbook.book.falsify"]
         try:
             done = subprocess.run(command, input=job, capture_output=True, **settings)
         except subprocess.TimeoutExpired:
@@ -210,11 +211,11 @@ def _crossing(claim: ledger.Claim, kept: Trial | None, flips: Trial) -> float | 
 
 def store(paper: Paper, found: Mapping[str, Mapping]) -> Path:
     """Write `found` beside the paper's data, with the date and versions that it was measured at."""
-    from rcbook.run import write
+    from rcbook.book.run import write
 
     versions = {name: metadata.version(name) for name in ("numpy", "scipy")}
     head = {"date": date.today().isoformat(), "python": platform.python_version(), **versions}
-    path = Path(ledger.__file__).parent / "papers" / f"{paper.key}.margins.json"
+    path = Path(rcbook.__file__).parent / "papers" / f"{paper.key}.margins.json"
     write(path, json.dumps({**head, "claims": found}, indent=1) + "\n")
     return path
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import re
 import shutil
 import subprocess
 import sys
@@ -14,10 +13,15 @@ from pathlib import Path
 
 import nbformat
 
-from rcbook import ledger, pages, prose
-from rcbook.project import Project
-from rcbook.run import Run, alternative, plain
+from rcbook import ledger
+from rcbook.book import pages
+from rcbook.book.execute import alternative
+from rcbook.book.project import Project
+from rcbook.book.run import Run, plain
+from rcbook.ledger import show
+from rcbook.ledger.marks import without_marks
 
+LEDGER = "../ledger.html"  # as a chapter sees it
 TAIL = 60  # lines of Sphinx's output shown when it fails
 _JUPYTER_BOOK = "from jupyter_book.cli.main import main; main()"  # it has no __main__
 _OPTIONS = ("-W", "-n", "--keep-going", "-q")
@@ -55,7 +59,7 @@ def fill(stage: Path, project: Project, run: Run) -> None:
         (stage / "notebooks" / name).write_text(text, encoding="utf-8")
     written = {page.name: page.read_text(encoding="utf-8") for page in project.book.glob("*.md")}
     for name, text in (written | pages.pages(project.papers, run.rows)).items():
-        (stage / name).write_text(prose.without_marks(text), encoding="utf-8")
+        (stage / name).write_text(without_marks(text), encoding="utf-8")
 
 
 def cover(notebooks: Mapping[str, nbformat.NotebookNode]) -> bytes:
@@ -75,16 +79,21 @@ def shown(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
     notebook = nbformat.from_dict(notebook)
     for cell in notebook.cells:
         if cell.cell_type == "markdown":
-            cell.source = prose.without_marks(cell.source)
+            cell.source = without_marks(cell.source)
         elif alternative(cell):
-            cell.metadata["mystnb"]["image"]["alt"] = prose.without_marks(alternative(cell))
+            cell.metadata["mystnb"]["image"]["alt"] = without_marks(alternative(cell))
         for output in cell.get("outputs", ()):
-            data = output.get("data", {})
-            data.pop(ledger.MIME, None)  # the renderer would warn of what it does not know
-            if 'class="rcbook-ledger"' in data.get("text/html", ""):
-                link = r'<a href="../ledger.html#\1"><code>\1</code></a>'
-                data["text/html"] = re.sub(r"<code>([\w.-]+)</code>", link, data["text/html"])
+            _link(output.get("data", {}))
     return notebook
+
+
+def _link(data: dict) -> None:
+    """Show the ledger rows of an output anew, with links to the ledger page, and drop the rows,
+    of which the renderer would warn."""
+    if rows := data.pop(ledger.MIME, None):
+        data["text/html"] = ledger.summary(rows, page=LEDGER)
+    if rows := data.pop(ledger.SHOWN, None):
+        data["text/html"] = show.table(rows, reasons=False, page=LEDGER)
 
 
 def mathjax() -> Path:

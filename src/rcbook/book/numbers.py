@@ -8,8 +8,11 @@ from pathlib import Path
 
 import nbformat
 
-from rcbook import ledger, prose
-from rcbook.project import Project
+from rcbook import ledger
+from rcbook.book.execute import alternative
+from rcbook.book.project import Project
+from rcbook.book.run import write
+from rcbook.ledger import marks, words
 
 ROUND = 30  # characters shown on either side of a number
 
@@ -20,7 +23,7 @@ class Place:
 
     file: str
     at: str
-    number: prose.Number
+    number: marks.Number
     around: str
 
     def __str__(self) -> str:
@@ -35,14 +38,14 @@ def survey(project: Project) -> list[Place]:
     printed = {claim.id: claim.printed for p in project.papers for claim in p.claims.values()}
     found: list[Place] = []
     for path in sorted(project.notebooks.glob("*.ipynb")):
-        found += _read(path.name, _cells(path), lambda text: prose.numbers(text, _of(printed)))
+        found += _read(path.name, _cells(path), lambda text: marks.numbers(text, _of(printed)))
     for key in (paper.key for paper in project.papers):
         for at, text, quoted in _texts(key):
-            found += _read(f"{key}.toml", [(at, text)], lambda t, q=quoted: prose.of_template(t, q))
+            found += _read(f"{key}.toml", [(at, text)], lambda t, q=quoted: marks.of_template(t, q))
     for path in sorted(project.book.glob("*.md")):
         text = path.read_text(encoding="utf-8")
-        found += _read(path.name, [("text", text)], prose.numbers)
-    found += _read("words.toml", _words(), prose.numbers)
+        found += _read(path.name, [("text", text)], marks.numbers)
+    found += _read("words.toml", _words(), marks.numbers)
     return found
 
 
@@ -69,8 +72,6 @@ def _read(file: str, texts: Iterable[tuple[str, str]], numbers: Callable) -> lis
 
 
 def _cells(path: Path) -> Iterable[tuple[str, str]]:
-    from rcbook.run import alternative
-
     for cell in nbformat.read(path, as_version=4).cells:
         if cell.cell_type == "markdown":
             yield cell.id, cell.source
@@ -103,7 +104,7 @@ def _texts(key: str) -> Iterable[tuple[str, str, Sequence[str]]]:
 
 
 def _words() -> Iterable[tuple[str, str]]:
-    return ((key, row["means"]) for key, row in ledger.words_source().items())
+    return ((key, row["means"]) for key, row in words.source().items())
 
 
 def rewrite(project: Project, typed: Mapping[str, Sequence]) -> int:
@@ -122,8 +123,6 @@ def rewrite(project: Project, typed: Mapping[str, Sequence]) -> int:
             for alt in (False, True):
                 values = {n.start: n.computed for n in wrong if (n.cell, n.alt) == (cell.id, alt)}
                 _put(cell, alt, values)
-        from rcbook.run import write
-
         write(path, nbformat.writes(notebook) + "\n")
         changed += len(wrong)
     return changed
@@ -134,17 +133,17 @@ def _put(cell: nbformat.NotebookNode, alt: bool, values: Mapping[int, str]) -> N
         return
     if alt:
         image = cell.metadata["mystnb"]["image"]
-        image["alt"] = prose.rewritten(image["alt"], values)
+        image["alt"] = marks.rewritten(image["alt"], values)
     else:
-        cell.source = prose.rewritten(cell.source, values)
+        cell.source = marks.rewritten(cell.source, values)
 
 
 def table(places: Sequence[Place]) -> str:
     """Counts per file and class, as text."""
     width = max((len(place.file) for place in places), default=4)
-    lines = [f"{'':{width}}  " + "  ".join(prose.CLASSES)]
+    lines = [f"{'':{width}}  " + "  ".join(marks.CLASSES)]
     for file in dict.fromkeys(place.file for place in places):
-        tally = prose.tally([place.number for place in places if place.file == file])
-        cells = "  ".join(f"{tally[kind]:>{len(kind)}}" for kind in prose.CLASSES)
+        tally = marks.tally([place.number for place in places if place.file == file])
+        cells = "  ".join(f"{tally[kind]:>{len(kind)}}" for kind in marks.CLASSES)
         lines.append(f"{file:{width}}  {cells}")
     return "\n".join(lines)

@@ -1,0 +1,147 @@
+"""Read `papers/KEY.toml` and refuse what cannot be judged, with the mend."""
+
+from __future__ import annotations
+
+import json
+import math
+import string
+import tomllib
+from collections.abc import Mapping
+from dataclasses import MISSING, fields
+from importlib import resources
+
+from rcbook.ledger.claim import (
+    CORRECTED,
+    KINDS,
+    NOT_COMPUTABLE,
+    NOT_REPRODUCED,
+    ROLES,
+    VERDICTS,
+    Claim,
+    Paper,
+    tolerances,
+)
+from rcbook.ledger.marks import without_marks
+from rcbook.ledger.words import ROW_OF
+
+
+def papers() -> tuple[str, ...]:
+    """Keys of all papers in the package, in the order of their chapters."""
+    files = resources.files("rcbook").joinpath("papers").iterdir()
+    found = {f.name.removesuffix(".toml"): f for f in files if f.name.endswith(".toml")}
+    chapters = {key: tomllib.loads(f.read_text(encoding="utf-8")) for key, f in found.items()}
+    return tuple(sorted(found, key=lambda key: (chapters[key].get("chapter", 0), key)))
+
+
+def load(key: str) -> Paper:
+    """Read and validate `papers/KEY.toml`.
+
+    Raises ValueError for an unknown key, a claim given twice, an unknown kind or verdict, a
+    reference to a convention or erratum that is not there, and a claim expected to fail whose
+    reason quotes nothing computed.
+    """
+    data = source(key)
+    parts = [f.name for f in fields(Paper) if f.name not in ("key", "margins")]
+    if absent := [part for part in parts if part not in data]:
+        raise ValueError(f"{key}.toml lacks {', '.join(absent)}; add them")
+    claims: dict[str, Claim] = {}
+    for entry in data["claims"]:
+        claim = _claim(key, entry)
+        if claim.id in claims:
+            raise ValueError(f"{claim.id} stands twice in {key}.toml; remove one")
+        _validate(claim, data)
+        claims[claim.id] = claim
+    margins = resources.files("rcbook").joinpath("papers", f"{key}.margins.json")
+    measured = json.loads(margins.read_text(encoding="utf-8")) if margins.is_file() else {}
+    given = _unmarked({part: data[part] for part in parts}) | {"claims": claims}
+    return Paper(key, **given, margins=measured.get("claims", {}))
+
+
+def source(key: str) -> dict:
+    """What `papers/KEY.toml` holds, marks and all.  Raises ValueError for an unknown key."""
+    file = resources.files("rcbook").joinpath("papers", f"{key}.toml")
+    if not file.is_file():
+        raise ValueError(f"no paper {key!r}; choose one of {', '.join(papers())}")
+    return tomllib.loads(file.read_text(encoding="utf-8"))
+
+
+def _claim(paper: str, entry: Mapping) -> Claim:
+    known = {f.name: f.default is MISSING for f in fields(Claim) if f.init and f.name != "paper"}
+    known["role"] = True
+    name = entry.get("id", f"a claim of {paper} without id")
+    if unknown := entry.keys() - known:
+        raise ValueError(f"{name}: unknown field {', '.join(sorted(unknown))}; remove it")
+    if absent := [field for field, needed in known.items() if needed and field not in entry]:
+        raise ValueError(f"{name}: lacks {', '.join(absent)}; add it")
+    if entry["kind"] not in KINDS:
+        raise ValueError(f"{name}: kind {entry['kind']!r} is none of {', '.join(KINDS)}")
+    return Claim(paper=paper, **_unmarked(entry))
+
+
+def _unmarked(item):
+    """`item` with the marks of its numbers taken out of every text."""
+    if isinstance(item, str):
+        return without_marks(item)
+    if isinstance(item, dict):
+        return {name: _unmarked(part) for name, part in item.items()}
+    return item
+
+
+def _validate(claim: Claim, data: Mapping) -> None:
+    found = _unknown(claim, data) or _unfit_tolerance(claim) or _unfit_verdict(claim)
+    if found:
+        raise ValueError(f"{claim.id}: {found}")
+
+
+def _unknown(claim: Claim, data: Mapping) -> str:
+    """What the claim names that is not there, or nothing."""
+    if not claim.id.startswith(f"{claim.paper}."):
+        return "its id does not begin with the paper's key"
+    known = {
+        "expected": VERDICTS,
+        "role": ROLES,
+        "convention": data["conventions"],
+        "erratum": ("", *data["errata"]),
+        "flips_under": ("", *data["changes"]),
+        "word": ("", *ROW_OF),
+    }
+    for name, choices in known.items():
+        if (given := getattr(claim, name)) not in choices:
+            among = ", ".join(filter(None, choices)) or "nothing: the paper has none"
+            return f"{name} {given!r} is none of {among}"
+    if claim.flips_under and not claim.scored:
+        return f"an {claim.role} has no verdict to flip; remove flips_under"
+    return ""
+
+
+def _unfit_tolerance(claim: Claim) -> str:
+    if claim.word and claim.tolerance is not None:
+        return "it has a word and a tolerance of its own; remove one"
+    if (claim.tolerance is not None) != bool(claim.tolerance_reason):
+        return "a tolerance of its own needs a tolerance_reason, and the other way round"
+    if claim.tolerance is not None and not 0 <= claim.tolerance < math.inf:
+        return f"tolerance {claim.tolerance!r} is not a finite number of 0 or more"
+    if claim.tolerance is not None and tolerances(claim) is None:
+        return f"a tolerance means nothing for {claim.printed!r}; remove it"
+    return ""
+
+
+def _unfit_verdict(claim: Claim) -> str:
+    if claim.beyond_computation != (claim.expected == NOT_COMPUTABLE):
+        return "a measurement, or what says what is `lost`, is not computable, and nothing else"
+    if claim.expected in (NOT_REPRODUCED, NOT_COMPUTABLE) and not claim.reason:
+        return "it is expected to fail and gives no reason"
+    try:
+        quoted = quotes(claim.reason)
+    except ValueError as error:
+        return f"its reason cannot be read ({error}); write a brace that is no evidence twice"
+    if claim.expected == NOT_REPRODUCED and not quoted - {"printed"}:
+        return "its reason quotes nothing computed; put evidence in {braces}"
+    if claim.expected == CORRECTED and not claim.erratum and claim.convention == "primary":
+        return "a correction names its erratum or its convention"
+    return ""
+
+
+def quotes(reason: str) -> set[str]:
+    """The names in the braces of a claim's reason."""
+    return {name for _, name, _, _ in string.Formatter().parse(reason) if name}
