@@ -6,10 +6,10 @@ import sys
 
 import nbformat
 import pytest
-from conftest import COVER, LEDGER
+from conftest import COVER, LEDGER, write_notebook
 
 from rcbook import cli, ledger
-from rcbook.book import project, render, run
+from rcbook.book import project, render
 from rcbook.ledger import show
 
 
@@ -63,10 +63,10 @@ def test_a_flip_fails_and_leaves_the_book(at, capsys):
 
 
 def test_build_says_why_it_could_not_render(at, capsys, monkeypatch):
-    at(one=[LEDGER])  # no cover
+    made = at(one=[LEDGER])  # no cover
     assert cli.main(["build"]) == 1
     assert "the book has no cover" in capsys.readouterr().err
-    assert not list(run.Path.cwd().glob("book/_build/stage-*"))
+    assert not list(made.build.glob("stage-*"))
 
 
 def test_a_ctrl_c_while_rendering_leaves_no_stage(at, capsys, monkeypatch):
@@ -140,3 +140,29 @@ def test_numbers_are_rewritten_by_one_command(at, capsys):
     assert cli.main(["numbers", "--file", "one.ipynb", "--rewrite"]) == 0
     assert "1 numbers rewritten" in capsys.readouterr().out
     assert cli.main(["check"]) == 0
+
+
+def test_one_chapter_can_be_checked_alone_and_the_ledger_stays(at, capsys):
+    made = at(one=[LEDGER], two=["1 / 0"])
+    made.build.mkdir()
+    made.ledger_file.write_text("old", encoding="utf-8")
+    assert cli.main(["check", "--paper", "fake"]) == 0
+    said = capsys.readouterr().out
+    assert "fake.x: printed 2.0, ours 2.01: reproduced\n" in said
+    assert "two.ipynb" not in said
+    assert made.ledger_file.read_text(encoding="utf-8") == "old"
+
+
+def test_a_ledger_older_than_a_failed_run_says_so(at, capsys):
+    made = at(one=[LEDGER])
+    assert cli.main(["check"]) == 0
+    write_notebook(made.notebooks / "two.ipynb", ["1 / 0"])
+    assert cli.main(["check"]) == 1
+    capsys.readouterr()
+    assert cli.main(["ledger"]) == 0
+    assert "the last run failed; this is the ledger of an earlier one" in capsys.readouterr().err
+    (made.notebooks / "two.ipynb").unlink()
+    assert cli.main(["check"]) == 0
+    capsys.readouterr()
+    assert cli.main(["ledger"]) == 0
+    assert not capsys.readouterr().err

@@ -238,6 +238,7 @@ citation = "A. Author, A Paper"
 notebook = "paper.ipynb"
 chapter = 1
 [idea]
+cite = "horng1989"
 loop = "one"
 index = "time"
 period = "a turn"
@@ -246,6 +247,9 @@ primary = { title = "Plain", text = "as printed" }
 cut = { title = "Cut", text = "digits are cut" }
 [errata.eq25]
 where = "eq. 25"
+printed = "a"
+corrected = "b"
+why = "a slip"
 [changes.gain]
 what = "the gain"
 sizes = [0.01, 0.1]
@@ -300,7 +304,11 @@ def test_a_good_file_loads(folder):
         ('id = "paper.b"', 'id = "b"', "b: .*begin with the paper's key"),
         ('kind = "number"', 'kind = "numeral"', "'numeral' is none of number"),
         ('expected = "reproduced"', 'expected = "fine"', "'fine' is none of reproduced"),
-        ('unit = ""', 'unit = ""\nconvention = "lost"', "convention 'lost' is none of primary, cut"),
+        (
+            'unit = ""',
+            'unit = ""\nconvention = "lost"',
+            "'lost' is none of primary, cut",
+        ),
         ('unit = ""', 'unit = ""\nerratum = "eq9"', "erratum 'eq9' is none of eq25"),
         ('unit = ""', 'unit = ""\ntolerance = 0.1', "needs a tolerance_reason"),
         ('unit = ""', 'unit = ""\ntolerance_reason = "so"', "the other way round"),
@@ -350,6 +358,30 @@ def test_a_malformed_file_is_a_value_error_naming_the_claim_or_file(folder, old,
 
 
 # ---- roles and words ----
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('why = "a slip"\n', "", r"paper\.toml, \[errata\.eq25\]: lacks why; add it"),
+        ('why = "a slip"', 'because = "a slip"\nwhy = ""', r"\[errata\.eq25\]: unknown because"),
+        ('cite = "horng1989"\n', "", r"paper\.toml, \[idea\]: lacks cite"),
+        (
+            '{ title = "Cut", text = "digits are cut" }',
+            '"cut"',
+            r"\[conventions\.cut\]: 'cut' is no",
+        ),
+        ('apply = "pass"\n', "", r"\[changes\.gain\]: lacks apply"),
+        ("sizes = [0.01, 0.1]", "sizes = []", r"\[changes\.gain\]: sizes \[\]; give one"),
+        ("chapter = 1\n", "chapter = 1\ncolour = 2\n", "unknown part colour; remove it"),
+        ("{value:.2f} s", "{value:.2f s", "its reason cannot be read"),
+    ],
+)
+def test_what_is_missing_unknown_or_unreadable_is_named_with_its_place(folder, old, new, message):
+    assert old in GOOD
+    folder(GOOD.replace(old, new, 1))
+    with pytest.raises(ValueError, match=message):
+        ledger.load("paper")
 
 
 @pytest.mark.parametrize(

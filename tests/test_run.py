@@ -141,6 +141,10 @@ assert os.path.basename(os.getcwd()) == "notebooks\""""
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupt_leaves_nothing_behind(make, number):
     project = make(one=[LEDGER, PID, "import time; time.sleep(60)"])
+    for paper in map(ledger.load, ledger.papers()):  # the command looks for all of the package
+        title = nbformat.v4.new_markdown_cell(f"# {paper.title}")
+        stub = nbformat.v4.new_notebook(cells=[title])
+        nbformat.write(stub, project.notebooks / paper.notebook)
     run.write(project.ledger_file, "old\n")
     command = [sys.executable, "-m", "rcbook.cli", "check"]
     process = subprocess.Popen(command, cwd=project.root, stdout=-1, stderr=-1)

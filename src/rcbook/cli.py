@@ -45,6 +45,7 @@ def _parser() -> argparse.ArgumentParser:
     build = commands.add_parser("build", help="execute, judge and render to book/_build/html")
     build.set_defaults(run=_build)
     check = commands.add_parser("check", help="execute and judge; exit 1 when a verdict flips")
+    check.add_argument("--paper", metavar="KEY", help="only this chapter, with all its verdicts")
     check.set_defaults(run=_check)
     falsify = commands.add_parser("falsify", help="change the model and see each verdict flip")
     falsify.add_argument("--paper", metavar="KEY", help="only this paper, such as horng1989")
@@ -62,11 +63,17 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _check(_) -> int:
+def _check(arguments: argparse.Namespace) -> int:
     from rcbook.book import run
     from rcbook.book.project import find
 
-    return OK if run.check(find(Path.cwd())).ok else FAILED
+    if not _known(arguments.paper):
+        return USAGE
+    project = find(Path.cwd())
+    if arguments.paper:
+        paper = next(paper for paper in project.papers if paper.key == arguments.paper)
+        return OK if run.check_paper(project, paper).ok else FAILED
+    return OK if run.check(project).ok else FAILED
 
 
 def _build(_) -> int:
@@ -148,7 +155,10 @@ def _ledger(arguments: argparse.Namespace) -> int:
 
     if not _known(arguments.paper):
         return USAGE
-    file = find(Path.cwd()).ledger_file
+    project = find(Path.cwd())
+    file = project.ledger_file
+    if project.stale_mark.exists():
+        print("rcbook: the last run failed; this is the ledger of an earlier one", file=sys.stderr)
     if not file.is_file():
         raise ValueError("there is no ledger yet; run `rcbook check` first")
     rows = json.loads(file.read_text(encoding="utf-8"))

@@ -211,7 +211,7 @@ def _crossing(claim: ledger.Claim, kept: Trial | None, flips: Trial) -> float | 
 
 def store(paper: Paper, found: Mapping[str, Mapping]) -> Path:
     """Write `found` beside the paper's data, with the date and versions that it was measured at."""
-    from rcbook.book.run import write
+    from rcbook.book.project import write
 
     versions = {name: metadata.version(name) for name in ("numpy", "scipy")}
     head = {"date": date.today().isoformat(), "python": platform.python_version(), **versions}

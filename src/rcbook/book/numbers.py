@@ -10,8 +10,7 @@ import nbformat
 
 from rcbook import ledger
 from rcbook.book.execute import alternative
-from rcbook.book.project import Project
-from rcbook.book.run import write
+from rcbook.book.project import Project, write
 from rcbook.ledger import marks, words
 
 ROUND = 30  # characters shown on either side of a number
@@ -31,22 +30,34 @@ class Place:
 
 
 def survey(project: Project) -> list[Place]:
-    """Every number in notebooks, data files and pages of the book.
+    """Every number in notebooks, pages and data files of the book.
 
     Raises ValueError, naming the place, for a mark that cannot be read.
     """
+    return [*of_texts(project), *of_data(project)]
+
+
+def of_texts(project: Project) -> list[Place]:
+    """Every number in the notebooks and pages.  Raises ValueError as `survey` does."""
     printed = {claim.id: claim.printed for p in project.papers for claim in p.claims.values()}
     found: list[Place] = []
     for path in sorted(project.notebooks.glob("*.ipynb")):
         found += _read(path.name, _cells(path), lambda text: marks.numbers(text, _of(printed)))
-    for key in (paper.key for paper in project.papers):
-        for at, text, quoted in _texts(key):
-            found += _read(f"{key}.toml", [(at, text)], lambda t, q=quoted: marks.of_template(t, q))
     for path in sorted(project.book.glob("*.md")):
         text = path.read_text(encoding="utf-8")
         found += _read(path.name, [("text", text)], marks.numbers)
-    found += _read("words.toml", _words(), marks.numbers)
     return found
+
+
+def of_data(project: Project) -> list[Place]:
+    """Every number in the data files.  Raises ValueError as `survey` does."""
+    found: list[Place] = []
+    for paper in project.papers:
+        for at, text, quoted in _texts(paper.key):
+            found += _read(
+                f"{paper.key}.toml", [(at, text)], lambda t, q=quoted: marks.of_template(t, q)
+            )
+    return found + _read("words.toml", _words(), marks.numbers)
 
 
 def _of(printed: Mapping[str, str]) -> Callable[[str], str]:
@@ -72,7 +83,11 @@ def _read(file: str, texts: Iterable[tuple[str, str]], numbers: Callable) -> lis
 
 
 def _cells(path: Path) -> Iterable[tuple[str, str]]:
-    for cell in nbformat.read(path, as_version=4).cells:
+    try:
+        cells = nbformat.read(path, as_version=4).cells
+    except (nbformat.reader.NotJSONError, nbformat.ValidationError, AttributeError):
+        cells = []  # execution says why it is no notebook
+    for cell in cells:
         if cell.cell_type == "markdown":
             yield cell.id, cell.source
         elif text := alternative(cell):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,6 +33,11 @@ class Project:
         return self.build / "ledger.json"
 
     @property
+    def stale_mark(self) -> Path:
+        """There when a later run than that of the ledger failed."""
+        return self.build / "ledger.stale"
+
+    @property
     def html(self) -> Path:
         return self.build / "html"
 
@@ -45,3 +51,14 @@ def find(start: Path) -> Project:
         if (folder / "book" / "_config.yml").is_file() and (folder / "notebooks").is_dir():
             return Project(folder, tuple(ledger.load(key) for key in ledger.papers()))
     raise ValueError(f"no checkout of rcbook at or above {start}; run this inside a clone")
+
+
+def write(path: Path, text: str) -> None:
+    """Put `text` into `path` whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.with_name(f".{path.name}-{os.getpid()}")
+    try:
+        beside.write_text(text, encoding="utf-8", newline="\n")
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import nbformat
 
 from rcbook import ledger
+from rcbook.book import preflight
 from rcbook.book.execute import LIMIT, Failure, Typed, execute
-from rcbook.book.project import Project
+from rcbook.book.project import Project, write
 from rcbook.ledger import show
 
 _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
@@ -49,27 +48,37 @@ def check(project: Project, limit: float = LIMIT) -> Run:
     """Execute (at most `limit` seconds per notebook), judge, say what came out, keep the ledger.
 
     The ledger is kept only when every claim was computed.
-    Raises ValueError when the checkout has no notebook.
+    Raises ValueError when the checkout has no notebook, or something is wrong with it that can be
+    seen before anything is executed.
     """
     paths = sorted(project.notebooks.glob("*.ipynb"))
     if not paths:
         raise ValueError(f"no notebook in {project.notebooks}; put one there")
+    if found := preflight.problems(project):
+        raise ValueError("nothing was executed, because\n  " + "\n  ".join(found))
     run = judge(project.papers, *execute(paths, limit))
     if run.complete:
         write(project.ledger_file, ledger.dumps(run.rows))
+        project.stale_mark.unlink(missing_ok=True)
+    elif project.ledger_file.exists():
+        write(project.stale_mark, "A later run failed.\n")
     report(run)
     return run
 
 
-def write(path: Path, text: str) -> None:
-    """Put `text` into `path` whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    beside = path.with_name(f".{path.name}-{os.getpid()}")
-    try:
-        beside.write_text(text, encoding="utf-8", newline="\n")
-        os.replace(beside, path)
-    finally:
-        beside.unlink(missing_ok=True)
+def check_paper(project: Project, paper: ledger.Paper, limit: float = LIMIT) -> Run:
+    """Execute the notebook of one paper and say what came out; the ledger file stays as it is.
+
+    Raises ValueError when its notebook is not there.
+    """
+    path = project.notebooks / paper.notebook
+    if not path.is_file():
+        raise ValueError(f"{paper.key}.toml: its notebook {path} is not there; put it there")
+    run = judge([paper], *execute([path], limit))
+    for row in run.rows:
+        print(show.line(row))
+    report(run)
+    return run
 
 
 def judge(

@@ -44,6 +44,9 @@ def load(key: str) -> Paper:
     parts = [f.name for f in fields(Paper) if f.name not in ("key", "margins")]
     if absent := [part for part in parts if part not in data]:
         raise ValueError(f"{key}.toml lacks {', '.join(absent)}; add them")
+    if unknown := data.keys() - {"key", *parts}:
+        raise ValueError(f"{key}.toml: unknown part {', '.join(sorted(unknown))}; remove it")
+    _check_tables(key, data)
     claims: dict[str, Claim] = {}
     for entry in data["claims"]:
         claim = _claim(key, entry)
@@ -55,6 +58,29 @@ def load(key: str) -> Paper:
     measured = json.loads(margins.read_text(encoding="utf-8")) if margins.is_file() else {}
     given = _unmarked({part: data[part] for part in parts}) | {"claims": claims}
     return Paper(key, **given, margins=measured.get("claims", {}))
+
+
+_TABLES = {  # fields that must be there, and fields that may be
+    "conventions": ({"title", "text"}, set()),
+    "errata": ({"where", "printed", "corrected", "why"}, set()),
+    "changes": ({"what", "apply"}, {"sizes", "unit"}),
+}
+
+
+def _check_tables(key: str, data: Mapping) -> None:
+    entries = [("idea", data["idea"], ({"cite", "loop", "index", "period"}, set()))]
+    for name, allowed in _TABLES.items():
+        entries += [(f"{name}.{at}", entry, allowed) for at, entry in data[name].items()]
+    for at, entry, (needed, optional) in entries:
+        if not isinstance(entry, dict):
+            raise ValueError(f"{key}.toml, [{at}]: {entry!r} is no table; give {sorted(needed)}")
+        if absent := needed - entry.keys():
+            raise ValueError(f"{key}.toml, [{at}]: lacks {', '.join(sorted(absent))}; add it")
+        if unknown := entry.keys() - needed - optional:
+            raise ValueError(f"{key}.toml, [{at}]: unknown {', '.join(sorted(unknown))}; remove it")
+        sizes = entry.get("sizes", [1])
+        if at.startswith("changes") and not (sizes and all(size > 0 for size in sizes)):
+            raise ValueError(f"{key}.toml, [{at}]: sizes {sizes!r}; give one or more above 0")
 
 
 def source(key: str) -> dict:

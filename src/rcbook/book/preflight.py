@@ -1,0 +1,80 @@
+"""What is wrong with a project before anything is executed: file, place and mend."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import nbformat
+import yaml
+
+from rcbook.book import numbers
+from rcbook.book.project import Project
+from rcbook.ledger import Paper
+
+_CITED = re.compile(r"\{cite(?::\w+)?\}`([^`]+)`")
+_ENTRY = re.compile(r"^@\w+\{\s*([^,\s]+)", re.MULTILINE)
+
+
+def problems(project: Project) -> list[str]:
+    """What would end in a dead link, a missing page or a wrong count; empty when all is well."""
+    found = [problem for paper in project.papers for problem in _of_paper(project, paper)]
+    found += _contents(project)
+    found += _citations(project)
+    try:
+        numbers.of_texts(project)
+    except ValueError as error:
+        found.append(str(error))
+    return found
+
+
+def _of_paper(project: Project, paper: Paper) -> Iterable[str]:
+    file = f"{paper.key}.toml"
+    twins = [p.key for p in project.papers if p.chapter == paper.chapter and p is not paper]
+    if twins:
+        yield f"{file}: chapter {paper.chapter} is also that of {twins[0]}; give it another number"
+    path = project.notebooks / paper.notebook
+    if not path.is_file():
+        yield f"{file}: its notebook {paper.notebook} is not in notebooks/; put it there"
+        return
+    cells = _cells(path)
+    first = cells[0].source.splitlines()[0] if cells and cells[0].source else ""
+    if first != f"# {paper.title}":
+        yield f"{paper.notebook}: its first line is {first!r}; make it '# {paper.title}', the title"
+
+
+def _cells(path: Path) -> list[nbformat.NotebookNode]:
+    try:
+        return nbformat.read(path, as_version=4).cells
+    except (nbformat.reader.NotJSONError, nbformat.ValidationError, AttributeError):
+        return []  # execution says why
+
+
+def _contents(project: Project) -> Iterable[str]:
+    """Notebooks without a line in the table of contents, and lines without a file."""
+    text = (project.book / "_toc.yml").read_text(encoding="utf-8")
+    parts = yaml.safe_load(text).get("parts", ())
+    chapters = [chapter for part in parts for chapter in part.get("chapters", ())]
+    listed = {chapter["file"] for chapter in chapters if "file" in chapter}
+    globbed = any("glob" in chapter for chapter in chapters)
+    there = {f"notebooks/{path.stem}" for path in project.notebooks.glob("*.ipynb")}
+    for name in sorted(there - listed) * (not globbed):
+        yield f"_toc.yml: no line for {name}; add `- file: {name}` where the chapter belongs"
+    for name in sorted(name for name in listed if name.startswith("notebooks/")):
+        if name not in there:
+            yield f"_toc.yml: {name} is no notebook; remove the line or add the notebook"
+
+
+def _citations(project: Project) -> Iterable[str]:
+    """Keys that are cited and not in the bibliography."""
+    known = set(_ENTRY.findall((project.book / "references.bib").read_text(encoding="utf-8")))
+    texts = {f"{paper.key}.toml": f"{{cite}}`{paper.idea['cite']}`" for paper in project.papers}
+    for path in project.notebooks.glob("*.ipynb"):
+        texts[path.name] = "\n".join(cell.source for cell in _cells(path))
+    for path in project.book.glob("*.md"):
+        texts[path.name] = path.read_text(encoding="utf-8")
+    for name, text in texts.items():
+        cited = {key.strip() for keys in _CITED.findall(text) for key in keys.split(",")}
+        for key in sorted(cited - known):
+            yield f"{name}: cites {key!r}, which is not in book/references.bib; add the entry"

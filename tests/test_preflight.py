@@ -1,0 +1,79 @@
+"""What is wrong with a project is said before anything is executed: file, place and mend."""
+
+import shutil
+
+import nbformat
+import pytest
+from conftest import LEDGER, ROOT
+
+from rcbook.book import preflight, run
+from rcbook.book.project import Project, find
+
+
+@pytest.fixture
+def sound(make):
+    """A fake project with nothing wrong."""
+    project = make(one=[LEDGER])
+    assert not preflight.problems(project)
+    return project
+
+
+def rewrite(path, old, new):
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+
+
+def test_the_book_has_no_problem():
+    assert not preflight.problems(find(ROOT))
+
+
+def test_a_notebook_that_is_not_there(sound):
+    (sound.notebooks / "one.ipynb").rename(sound.notebooks / "two.ipynb")
+    assert any(
+        "fake.toml: its notebook one.ipynb is not in notebooks/" in problem
+        for problem in preflight.problems(sound)
+    )
+
+
+def test_a_notebook_without_a_line_in_the_contents_and_a_line_without_a_notebook(tmp_path):
+    for folder in ("book", "notebooks"):
+        ignore = shutil.ignore_patterns("_build")
+        shutil.copytree(ROOT / folder, tmp_path / folder, ignore=ignore)
+    rewrite(tmp_path / "book" / "_toc.yml", "noncircular_lathe", "noncircular_late")
+    assert preflight.problems(Project(tmp_path, find(ROOT).papers)) == [
+        "_toc.yml: no line for notebooks/noncircular_lathe; "
+        "add `- file: notebooks/noncircular_lathe` where the chapter belongs",
+        "_toc.yml: notebooks/noncircular_late is no notebook; remove the line or add the notebook",
+    ]
+
+
+def test_a_key_that_is_not_in_the_bibliography(sound):
+    rewrite(sound.notebooks / "one.ipynb", "With $x^2$.", "With {cite}`nobody1900,francis1976`.")
+    (problem,) = preflight.problems(sound)
+    assert problem.startswith("one.ipynb: cites 'nobody1900', which is not in book/references.bib")
+
+
+def test_a_title_that_differs(sound):
+    rewrite(sound.notebooks / "one.ipynb", "# The case one", "# Another case")
+    (problem,) = preflight.problems(sound)
+    assert "its first line is '# Another case'; make it '# The case one'" in problem
+
+
+def test_a_mark_that_cannot_be_read(sound):
+    rewrite(sound.notebooks / "one.ipynb", "With $x^2$.", "A 5<!-- {x} -->.")
+    (problem,) = preflight.problems(sound)
+    assert problem.startswith("one.ipynb, ") and "format" in problem
+
+
+def test_nothing_is_executed_when_something_is_wrong(sound):
+    rewrite(sound.notebooks / "one.ipynb", "# The case one", "# Another case")
+    with pytest.raises(ValueError, match=r"(?s)nothing was executed, because.*first line"):
+        run.check(sound)
+    assert not sound.ledger_file.exists()
+
+
+def test_a_file_that_is_no_notebook_is_left_to_the_execution(sound):
+    nbformat.write(nbformat.v4.new_notebook(), sound.notebooks / "two.ipynb")
+    (sound.notebooks / "three.ipynb").write_text("{", encoding="utf-8")
+    assert not [p for p in preflight.problems(sound) if "three" in p]
