@@ -56,6 +56,10 @@ def _parser() -> argparse.ArgumentParser:
     numbers.add_argument("--rewrite", action="store_true", help="execute, and type what comes out")
     numbers.add_argument("--file", metavar="NAME", help="only this file, such as one_idea.ipynb")
     numbers.set_defaults(run=_numbers)
+    new = commands.add_parser("new", help="write the skeletons of a new case study")
+    new.add_argument("key", metavar="KEY", help="such as smith2001")
+    new.add_argument("--title", default="", help="of its chapter")
+    new.set_defaults(run=_new)
     show = commands.add_parser("ledger", help="print the ledger of the last run")
     show.add_argument("--json", action="store_true", help="as a list of objects")
     show.add_argument("--paper", metavar="KEY", help="only this paper, such as horng1989")
@@ -147,6 +151,17 @@ def _numbers(arguments: argparse.Namespace) -> int:
     print(numbers.table(places))
     print(f"\n{len(places)} numbers in the text, {len(lost)} unaccounted")
     return FAILED if lost else OK
+
+
+def _new(arguments: argparse.Namespace) -> int:
+    from rcbook.book.new import create
+    from rcbook.book.project import find
+
+    project = find(Path.cwd())
+    for path in create(project, arguments.key, arguments.title):
+        print(f"wrote {path.relative_to(project.root)}")
+    print(f"next: fill them in, then `rcbook check --paper {arguments.key}`")
+    return OK
 
 
 def _ledger(arguments: argparse.Namespace) -> int:
