@@ -179,6 +179,15 @@ def test_corrected_route_is_taken_only_when_the_plain_reading_fails():
     assert statement.verdict == ledger.CORRECTED
 
 
+def test_misprinted_digits_are_compared_with_what_the_erratum_makes_of_them():
+    own = claim(printed="1.6458", mended="1.6471", expected=ledger.CORRECTED, erratum="eq17")
+    exact = 0.14 * 3.43**2
+    assert judge(own, exact, corrected=exact).verdict == ledger.CORRECTED
+    assert judge(own, 1.6458, corrected=exact).verdict == ledger.REPRODUCED
+    assert judge(own, 1.65, corrected=1.65).verdict == ledger.NOT_REPRODUCED
+    assert judge(own, exact).verdict == ledger.NOT_REPRODUCED  # nothing corrected was given
+
+
 def test_a_measurement_is_not_computable():
     own = claim(kind="measurement", expected=ledger.NOT_COMPUTABLE, reason="cut on a machine")
     assert judge(own).verdict == ledger.NOT_COMPUTABLE

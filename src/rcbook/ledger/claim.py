@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal, InvalidOperation
 
 from rcbook.ledger.words import ROW_OF, WORDS
@@ -66,6 +66,7 @@ class Claim:
     tolerance_reason: str = ""
     convention: str = "primary"  # key of the paper's conventions
     erratum: str = ""  # key of the paper's errata
+    mended: str = ""  # `printed` after its erratum, where digits themselves are the misprint
     reason: str = ""  # format string over the evidence
     lost: str = ""  # what is lost that a computation would need, such as a figure
     parsed: Printed = field(init=False, repr=False, compare=False)
@@ -77,6 +78,11 @@ class Claim:
     def beyond_computation(self) -> bool:
         """Whether nothing can be computed for it: a measurement, or something is lost."""
         return self.kind == "measurement" or bool(self.lost)
+
+    @property
+    def corrected(self) -> Claim:
+        """The claim with its misprinted digits mended, which a corrected value has to meet."""
+        return replace(self, printed=self.mended, mended="") if self.mended else self
 
     @property
     def scored(self) -> bool:

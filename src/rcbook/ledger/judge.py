@@ -85,8 +85,9 @@ def judge(claim: Claim, value: object = None, corrected: object = None, **eviden
     """Judge `claim` by the value its plain reading gives, else by the corrected reading.
 
     The verdict is *reproduced* when `value` agrees; *reproduced with correction* when it does not
-    and `corrected`, computed under the claim's erratum or convention, does; *not reproduced* when
-    neither does; *not computable* for a measurement, or where what it needs is lost.  `evidence`
+    and `corrected`, computed under the claim's erratum or convention, does (or agrees with the
+    `mended` digits, where the erratum is in the digits); *not reproduced* when neither does; *not
+    computable* for a measurement, or where what it needs is lost.  `evidence`
     are the numbers and booleans that the claim's reason quotes; `value`, `corrected` and `printed`
     may be quoted as well.
     An infinite value says that what is printed does not exist; the evidence then stands for it.
@@ -108,7 +109,7 @@ def judge(claim: Claim, value: object = None, corrected: object = None, **eviden
         raise ValueError(f"{claim.id}: a {claim.kind} needs a computed value")
     elif agrees(claim, value):
         verdict, computed = REPRODUCED, value
-    elif corrected is not None and agrees(claim, corrected):
+    elif corrected is not None and agrees(claim.corrected, corrected):
         verdict, computed = CORRECTED, corrected
         evidence = {"plain": value, **evidence} if claim.kind != "statement" else evidence
     else:

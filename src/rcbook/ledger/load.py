@@ -153,6 +153,8 @@ def _unfit_tolerance(claim: Claim) -> str:
 
 
 def _unfit_verdict(claim: Claim) -> str:
+    if claim.mended and not claim.erratum:
+        return f"mended {claim.mended!r} names no erratum that mends it; add its key"
     if claim.beyond_computation != (claim.expected == NOT_COMPUTABLE):
         return "a measurement, or what says what is `lost`, is not computable, and nothing else"
     if claim.expected in (NOT_REPRODUCED, NOT_COMPUTABLE) and not claim.reason:
