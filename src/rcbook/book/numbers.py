@@ -98,7 +98,8 @@ def _texts(key: str) -> Iterable[tuple[str, str, Sequence[str]]]:
     """The texts of a paper's data file that are ours, each with what it may quote unmarked."""
     data = ledger.source(key)
     for claim in data["claims"]:
-        quoted = [claim[name] for name in ("says", "printed", "where", "unit")]
+        fields = ("says", "printed", "mended", "where", "unit")
+        quoted = [claim.get(name, "") for name in fields]
         for name in ("reason", "tolerance_reason", "lost"):
             yield f"{claim['id']} {name}", claim.get(name, ""), quoted
     for name, erratum in data["errata"].items():
