@@ -178,17 +178,17 @@ def test_peak_square_finds_the_peak_of_any_polynomial(seed):
     rng = np.random.default_rng(seed)
     p = rng.standard_normal(int(rng.integers(1, 12)))
     # the search stops within 1e-10 rad of a flat top: 1e-18; the rest is rounding
-    assert zdomain._peak_square(p) == pytest.approx(peak_square(p), rel=1e-11)
+    assert zdomain.inverse._peak_square(p) == pytest.approx(peak_square(p), rel=1e-11)
 
 
 def test_peak_square_of_closed_forms():
-    assert zdomain._peak_square(np.array([1.0])) == 1.0
-    assert zdomain._peak_square(np.array([1.0, -3.0])) == pytest.approx(16.0, rel=1e-15)
+    assert zdomain.inverse._peak_square(np.array([1.0])) == 1.0
+    assert zdomain.inverse._peak_square(np.array([1.0, -3.0])) == pytest.approx(16.0, rel=1e-15)
     # |1 + z^-2|^2 = 4 cos(w)^2 and |1 - z^-1 + z^-2|^2 = (2 cos w - 1)^2
-    assert zdomain._peak_square(np.array([1.0, 0.0, 1.0])) == pytest.approx(4.0, rel=1e-15)
-    assert zdomain._peak_square(np.array([1.0, -1.0, 1.0])) == pytest.approx(9.0, rel=1e-15)
+    assert zdomain.inverse._peak_square(np.array([1.0, 0.0, 1.0])) == pytest.approx(4.0, rel=1e-15)
+    assert zdomain.inverse._peak_square(np.array([1.0, -1.0, 1.0])) == pytest.approx(9.0, rel=1e-15)
     # |1 + z^-1 - z^-2|^2 = 3 - 2 cos 2w = 5 - 4 cos(w)^2, an inner maximum at w = pi/2
-    assert zdomain._peak_square(np.array([1.0, 1.0, -1.0])) == pytest.approx(5.0, rel=1e-14)
+    assert zdomain.inverse._peak_square(np.array([1.0, 1.0, -1.0])) == pytest.approx(5.0, rel=1e-14)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
