@@ -85,6 +85,21 @@ def test_misjudging_one_kind_of_root_leaves_the_other():
     )
 
 
+def test_every_coefficient_may_be_misjudged_by_a_factor_of_its_own():
+    guess = SERVO.misjudged(zeros=(2.0, 0.5), poles=(4.0, 0.5, 0.5))  # powers of two: exact
+    assert guess == lathe.Servo(0.14, (1.54, 1.215), (0.56, *np.array(SERVO.poles[1:]) / 2), 0.01)
+    # a conjugate pair that is not misjudged as a pair is no servo
+    with pytest.raises(ValueError, match="without its conjugate"):
+        _ = SERVO.misjudged(poles=(1.0, 2.0, 1.0)).plant
+
+
+def test_the_steady_gain_is_the_product_of_the_factors_at_one():
+    # eq. 13 at z = 1, by hand
+    by_hand = 0.14 * 1.77 * 3.43 / (1.14 * (0.85**2 + 0.15**2))
+    assert SERVO.steady_gain == pytest.approx(by_hand, rel=1e-14)
+    assert lathe.NC_LATHE.steady_gain == pytest.approx(0.046 * 4 / (0.4**2 + 0.15**2), rel=1e-14)
+
+
 def test_misjudging_back_and_forth_gives_the_servo():
     there = lathe.ELECTRIC_SERVO.misjudged(2.0, 0.5)
     back = there.misjudged(0.5, 2.0)
@@ -216,6 +231,7 @@ BAD = {
     "NaN pole": (lambda: servo(poles=(NAN,)), r"nan.* NaN or infinity; give finite"),
     "negative interval": (lambda: servo(dt=-0.01), r"dt = -0\.01 must be a positive"),
     "NaN factor on zeros": (lambda: SERVO.misjudged(zeros=NAN), r"zeros = nan must be"),
+    "factor too many": (lambda: SERVO.misjudged(zeros=(1, 2, 3)), r"zeros has 3 factors; .*, or 2"),
     "infinite factor on poles": (lambda: SERVO.misjudged(poles=INF), r"poles = inf must be"),
     "standing spindle": (lambda: lathe.samples_per_turn(0.0, 0.01), r"speed = 0\.0 .*positive"),
     "backward spindle": (lambda: lathe.samples_per_turn(-9.0, 0.01), r"speed = -9\.0 .*positive"),

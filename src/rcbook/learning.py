@@ -3,7 +3,8 @@
     u_(L+1) = q (u_L + H e_L),    e_L = r - y_L,    y_L = G u_L,    u_0 = r
 
 G is the plant, H the law (a noncausal filter, its gain included), q a symmetric filter.  The law
-is designed on one plant and the passes run on another, so mismatch is one argument.
+is designed on one plant and the passes run on another, so mismatch is one argument; a first
+command u_0 other than the reference is another.
 """
 
 from __future__ import annotations
@@ -53,10 +54,14 @@ class Start:
     of the pass), "next" (those of the next pass), "on" (the plant run on with the beginning of
     the command) or "nothing" (zero).  For q, a pass from rest holds its first command before it
     and, with "nothing", its last one after it.
+
+    The look-ahead makes a law that recurs begin with corrections of samples before the first one;
+    they are never applied.  `forgets` says that its recursion starts with zeros instead of them.
     """
 
     before: str
     after: str
+    forgets: bool = False
 
     def __post_init__(self) -> None:
         allowed = {
@@ -67,6 +72,8 @@ class Start:
         if self.after not in allowed.get(self.before, ()):
             pairs = "; ".join(f"{b} with {' or '.join(a)}" for b, a in allowed.items())
             raise ValueError(f"before {self.before!r}, after {self.after!r}: choose {pairs}")
+        if self.forgets and self.before == "itself":
+            raise ValueError("a pass that has repeated for ever forgets nothing; start otherwise")
 
 
 PERIODIC = Start("itself", "itself")
@@ -103,8 +110,9 @@ def learn(
     start: Start = PERIODIC,
     rest: float = 0.0,
     noise: ArrayLike | None = None,
+    first: ArrayLike | None = None,
 ) -> Passes:
-    """Run pass 0, with the reference as command, and then `passes` learned ones.
+    """Run pass 0, with the command `first` (the reference), and then `passes` learned ones.
 
     `rest` is the constant that command and output have had before a start from rest, or before
     the first pass of a continuous run.  `noise`, (passes + 1, samples), is added to the output as
@@ -112,19 +120,35 @@ def learn(
     Source: Lee, Oh and Kim, eqs 2-5 and 18.
     Raises ValueError when the law looks ahead as far as the pass is long, when the reference is
     shorter than the plant's filters, when the plant is not stable, when passes are to repeat for
-    ever under a law that is not, and for noise of another shape or not finite.
+    ever under a law that is not, and for noise or a first command of another shape or not finite.
     """
     if not isinstance(start, Start):
         raise ValueError(f"start = {start!r}: give PERIODIC, CONTINUOUS, RESET or another Start")
     reference = signal(reference, "reference")
     passes = zdomain.whole_number(passes, "passes", 0)
     _require_fit(plant, law, reference.size)
-    if start.before == "itself" and not np.all(np.abs(law.poles) < 1):
-        raise ValueError(f"the law has poles {law.poles} and no pass repeats; start otherwise")
+    if start.before == "itself":
+        _require_repeating(law)
     noise = _noise(noise, (passes + 1, reference.size))
+    first = reference if first is None else signal(first, "first", reference.size)
+    rest = zdomain.real_number(rest, "rest")
     run = _run_on if start.before == "previous" else _run_apart
-    command, output = run(plant, law, reference, noise, start, zdomain.real_number(rest, "rest"))
+    command, output = run(plant, law, reference, first, noise, start, rest)
     return Passes(plant.dt, reference, command, output, reference - output)
+
+
+def track(plant: Plant, law: LearningLaw, reference: ArrayLike) -> Passes:
+    """Feedforward instead of learning: one pass, repeated for ever, with the command H r.
+
+    Under a zero-phase law this is zero-phase control: y = G H r (Lee, Oh and Kim, eq. 19).
+    Raises ValueError as `learn` does.
+    """
+    reference = signal(reference, "reference")
+    _require_fit(plant, law, reference.size)
+    _require_repeating(law)
+    command = _circular(law.filter, reference)
+    output = _circular(plant, command)
+    return Passes(plant.dt, reference, command[None], output[None], (reference - output)[None])
 
 
 def _noise(noise: ArrayLike | None, shape: tuple[int, int]) -> np.ndarray:
@@ -133,6 +157,11 @@ def _noise(noise: ArrayLike | None, shape: tuple[int, int]) -> np.ndarray:
     if np.shape(noise) != shape:
         raise ValueError(f"noise has shape {np.shape(noise)}; give one row per pass: {shape}")
     return signal(np.ravel(noise), "noise").reshape(shape)
+
+
+def _require_repeating(law: LearningLaw) -> None:
+    if not np.all(np.abs(law.poles) < 1):
+        raise ValueError(f"the law has poles {law.poles} and no pass repeats; start otherwise")
 
 
 def _require_fit(plant: Plant, law: LearningLaw, samples: int) -> None:
@@ -151,10 +180,10 @@ def _require_fit(plant: Plant, law: LearningLaw, samples: int) -> None:
         raise ValueError(f"the plant has poles {plant.poles}; close a loop round it first")
 
 
-def _run_apart(plant, law, reference, noise, start, rest):
+def _run_apart(plant, law, reference, first, noise, start, rest):
     """Passes that do not hand a state on: repeated for ever, or begun at rest."""
     command, output = np.empty(noise.shape), np.empty(noise.shape)
-    u = reference
+    u = first
     for i, disturbed in enumerate(noise):
         command[i], output[i] = u, _answer(plant, u, start, rest)[: u.size]
         error = reference - output[i] - disturbed
@@ -190,38 +219,42 @@ def _corrected(law: LearningLaw, u: np.ndarray, error: np.ndarray, start: Start)
     if start.before == "itself":
         moved = u + _circular(law.filter, error[:n])
         return _circular(NoncausalFilter(law.q, [1.0], half), moved)
-    correction = scipy.signal.lfilter(law.filter.b, law.filter.a, error)[law.filter.advance :]
+    correction = _correction(law, error, start)
     beyond = u[:half] if start.after != "nothing" else u[-1:].repeat(half)
     moved = np.append(u, beyond) + correction[: n + half]
     return np.convolve(np.append(u[:1].repeat(half), moved), law.q, "valid")
 
 
-def _run_on(plant, law, reference, noise, start, rest):
+def _correction(law: LearningLaw, error: np.ndarray, start: Start) -> np.ndarray:
+    """H e from sample 0 on, for an error that was zero before; shorter than it by the advance."""
+    ahead = law.filter.advance
+    begin = ahead if start.forgets else 0
+    driven = scipy.signal.lfilter(law.filter.b, [1.0], error)[begin:]
+    return scipy.signal.lfilter([1.0], law.filter.a, driven)[ahead - begin :]
+
+
+def _run_on(plant, law, reference, first, noise, start, rest):
     """One continuous run: every pass begins in the state in which the last one ended.
 
-    Before the run the command was the reference and there was no error, but the last samples of
-    pass 0 already look ahead from there to the first errors; with q = 1 this is the plug-in
-    repetitive loop.
+    Pass 0 is commanded by `first`, all of it.  Before the run there was no error and nothing was
+    corrected; what a filter q sees there is the end of `first`.
     """
     n, noise = reference.size, noise.ravel()
     block, half = n - law.look_ahead, law.q.size // 2
     b = plant.numerator
     state = scipy.signal.lfiltic(b, plant.a, np.full(plant.a.size, rest), np.full(b.size, rest))
-    u, y = np.zeros((2, noise.size))
-    wanted, ahead = np.resize(reference, noise.size), law.filter.advance
-    moved = np.resize(reference, n + noise.size)  # u + H e, from one pass before the run on
-    unfiltered = np.zeros(noise.size)  # pass 0 is the reference, not the filtered reference
-    unfiltered[:n] = reference - np.convolve(np.pad(reference, half, "wrap"), law.q, "valid")
-    before = reference[n - half :]
+    u, y = np.resize(first, (2, noise.size))
+    wanted = np.resize(reference, noise.size)
+    moved = np.append(first[n - half :], u)  # u + H e, from `half` samples before the run on
     for at in range(0, noise.size, block):
         now = slice(at, min(at + block, noise.size))
-        near = np.append(before, moved)[at : now.stop + 2 * half]
-        u[now] = np.convolve(near, law.q, "valid") + unfiltered[now]
+        if now.stop > n:
+            near = moved[max(at - n, 0) : now.stop - n + 2 * half]
+            u[max(at, n) : now.stop] = np.convolve(near, law.q, "valid")
         y[now], state = scipy.signal.lfilter(b, plant.a, u[now], zi=state)
-        error = np.append(np.zeros(n), (wanted - y - noise)[: now.stop])
-        correction = scipy.signal.lfilter(law.filter.b, law.filter.a, error)[ahead:]
-        known = slice(0, correction.size)
-        moved[known] = np.append(reference, u[: now.stop])[known] + correction
+        if now.stop > law.filter.advance:
+            correction = _correction(law, (wanted - y - noise)[: now.stop], start)
+            moved[half : half + correction.size] = u[: correction.size] + correction
     return u.reshape(-1, n), y.reshape(-1, n)
 
 

@@ -29,11 +29,27 @@ class Servo:
         b, a = _product(self.zeros), _product(self.poles)
         return Plant(real_number(self.gain, "gain") * b, a, 1, self.dt)
 
-    def misjudged(self, zeros: float = 1.0, poles: float = 1.0) -> Servo:
-        """The servo as an identification sees it that is off by these factors; the gain stays."""
-        zeros, poles = real_number(zeros, "zeros"), real_number(poles, "poles")
-        scaled = (tuple(f * c for c in cs) for f, cs in ((zeros, self.zeros), (poles, self.poles)))
-        return replace(self, **dict(zip(("zeros", "poles"), scaled, strict=True)))
+    @property
+    def steady_gain(self) -> float:
+        """Position per command when nothing moves, G(1)."""
+        return float(self.plant.b.sum() / self.plant.a.sum())
+
+    def misjudged(self, zeros: ArrayLike = 1.0, poles: ArrayLike = 1.0) -> Servo:
+        """The servo as an identification sees it that is off by these factors; the gain stays.
+
+        One factor for all zeros and one for all poles, or one for each coefficient.
+        """
+        off = {"zeros": _scaled(self.zeros, zeros, "zeros")}
+        return replace(self, **off, poles=_scaled(self.poles, poles, "poles"))
+
+
+def _scaled(coefficients: tuple[complex, ...], factors: ArrayLike, name: str) -> tuple:
+    factors = [real_number(f, name) for f in np.atleast_1d(factors).tolist()]
+    if len(factors) == 1:
+        factors *= len(coefficients)
+    if len(factors) != len(coefficients):
+        raise ValueError(f"{name} has {len(factors)} factors; give one, or {len(coefficients)}")
+    return tuple(f * c for f, c in zip(factors, coefficients, strict=True))
 
 
 def _product(coefficients: tuple[complex, ...]) -> np.ndarray:
