@@ -61,6 +61,7 @@ def _product(coefficients: tuple[complex, ...]) -> np.ndarray:
 
 ELECTRIC_SERVO = Servo(0.14, (0.77, 2.43), (0.14, -0.15 + 0.15j, -0.15 - 0.15j), 0.01)  # eq. 13
 NC_LATHE = Servo(0.046, (3.0,), (-0.6 + 0.15j, -0.6 - 0.15j), 0.01)  # eq. 21
+MISJUDGED = (1.25, 0.75)  # estimate over truth in figs 12 and 13
 
 
 def samples_per_turn(speed: float, dt: float) -> float:
