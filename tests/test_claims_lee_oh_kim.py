@@ -13,7 +13,8 @@ import pytest
 from conftest import ROOT
 from scipy.optimize import brentq
 
-from rcbook import falsify, ledger
+from rcbook import ledger
+from rcbook.book import falsify
 
 KEY = "lee_oh_kim"
 Z = np.exp(1j * np.linspace(0, np.pi, 20_001))
