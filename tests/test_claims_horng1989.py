@@ -157,7 +157,7 @@ def test_the_rival_pair_of_gains_is_better_in_both(computed):
 
 
 def test_runout_under_pi_control_is_6_pounds_from_peak_to_peak(computed):
-    force, command = run(None, wave(600))
+    force, _ = run(None, wave(600))
     assert computed["fig9.force-amplitude"] == pytest.approx(np.ptp(force[540:]), rel=1e-7)
     z = np.exp(2j * np.pi / 6)
     controller = KP + KI / z
