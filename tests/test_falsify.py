@@ -111,12 +111,12 @@ def folder(tmp_path):
     return tmp_path
 
 
-GROW = {"what": "the ratio of a circle", "sizes": [0.001, 0.1, 0.0001], "apply": CHANGE}
+GROW = {"what": "the ratio of a circle", "sizes": [0.001, 0.04, 0.0001], "apply": CHANGE}
 
 
 def test_a_change_turns_what_it_should_and_a_statement_that_fails_takes_no_other_with_it(folder):
     here = named(paper(grow=GROW), area="grow", mad="grow", safe="grow")
-    plain, grown = falsify.trials(here, folder, [("", None), ("grow", 0.1)])
+    plain, grown = falsify.trials(here, folder, [("", None), ("grow", 0.04)])
     assert set(plain.verdicts.values()) == {"reproduced"} and not plain.troubles
     assert grown.verdicts == {"fake.area": "not reproduced", "fake.safe": "reproduced"}
     assert len(grown.troubles) == 1 and "ZeroDivisionError" in grown.troubles[0]
@@ -137,16 +137,26 @@ def test_margins_bracket_the_size_that_flips(folder):
         "what": "the ratio of a circle",
         "unit": "relative",
         "keeps": 0.001,
-        "flips": 0.1,
+        "flips": 0.04,
     }
 
 
 def test_a_margin_below_the_smallest_size_is_measured_from_the_unchanged_model(folder):
-    grow = GROW | {"sizes": [0.1]}
+    grow = GROW | {"sizes": [0.04]}
     here = named(paper(grow=grow), area="grow")
-    margin = falsify.margins(here, falsify.trials(here, folder, [("", None), ("grow", 0.1)]))
+    margin = falsify.margins(here, falsify.trials(here, folder, [("", None), ("grow", 0.04)]))
     assert margin["fake.area"]["keeps"] == 0.0
     assert margin["fake.area"]["about"] == pytest.approx(3.145 / math.pi - 1, rel=1e-9)
+
+
+def test_no_line_is_drawn_to_a_number_that_has_run_away():
+    here = named(paper(grow=GROW), area="grow")
+    values = {"": 3.14159, "grow": 3.14 + 0.005 * (falsify.SHORT + 1)}
+    tried = [
+        Trial(name, size, {"fake.area": verdict}, {"fake.area": values[name]}, ())
+        for name, size, verdict in (("", None, "reproduced"), ("grow", 0.1, "not reproduced"))
+    ]
+    assert falsify.margins(here, tried)["fake.area"]["about"] is None
 
 
 def test_the_change_that_flips_first_is_the_most_telling():

@@ -28,6 +28,7 @@ from rcbook import ledger
 from rcbook.ledger import Ledger, Paper
 
 LIMIT = 900.0  # s per run; a notebook without its pictures takes less than with them
+SHORT = 30  # tolerances; over a longer way a number is not taken to move on a line
 SKIP = "no-claims"  # tag of cells that draw or sweep and feed no claim
 
 
@@ -193,7 +194,8 @@ def margins(paper: Paper, tried: Sequence[Trial]) -> dict[str, dict]:
 def _crossing(claim: ledger.Claim, kept: Trial | None, flips: Trial) -> float | None:
     """The size at which a computed number crosses its tolerance, on the line between two trials.
 
-    None for what is no number, and where no number crosses.
+    None for what is no number, where no number crosses, and where one has moved so far beyond its
+    tolerance that a line says nothing.
     """
     tolerances = ledger.tolerances(claim)
     if kept is None or tolerances is None or claim.kind == "bound":
@@ -203,7 +205,8 @@ def _crossing(claim: ledger.Claim, kept: Trial | None, flips: Trial) -> float | 
     printed, tolerances, before, after = (x if isinstance(x, list) else [x] for x in rows)
     crossings = []
     for p, tolerance, a, b in zip(printed, tolerances, before, after, strict=True):
-        if isinstance(a, int | float) and isinstance(b, int | float) and a != b:
+        numbers = isinstance(a, int | float) and isinstance(b, int | float) and a != b
+        if numbers and max(abs(a - float(p)), abs(b - float(p))) <= SHORT * tolerance:
             shares = ((float(p) + sign * tolerance - a) / (b - a) for sign in (-1, 1))
             crossings += [start + share * (end - start) for share in shares if 0 <= share <= 1]
     return min(crossings, default=None)
