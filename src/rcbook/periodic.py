@@ -88,14 +88,17 @@ class PeriodicPlant:
 
 
 def sample(
-    system: control.StateSpace | control.TransferFunction, intervals: ArrayLike
+    system: control.StateSpace | control.TransferFunction,
+    intervals: ArrayLike,
+    delay: float = 0.0,
 ) -> PeriodicPlant:
     """Sample a continuous plant behind a zero-order hold at one period of intervals T(k) in s.
 
-    The continuous state is balanced once and kept for all k.
+    The continuous state is balanced once and kept for all k.  What is held reaches the plant
+    `delay` s late, whatever the interval; earlier inputs that still matter are further states.
     Source: Hanson and Tsao (2000), eq. 2.
     Raises ValueError for a plant that is not continuous, has a direct path or several inputs or
-    outputs, and for intervals that are not positive.
+    outputs, for intervals that are not positive, and for a delay below 0 or beyond one period.
     """
     intervals = _intervals(intervals)
     if isinstance(system, control.TransferFunction):
@@ -105,13 +108,44 @@ def sample(
             f"{system.ninputs} inputs, {system.noutputs} outputs, dt = {system.dt!r}, D = "
             f"{system.D.tolist()}; give a continuous strictly proper plant with one of each"
         )
+    if not 0 <= zdomain.real_number(delay, "delay") <= intervals.sum():
+        raise ValueError(f"delay = {delay!r} s must lie between 0 and one period")
     scaled = balanced(system)
     n = scaled.nstates
     joint = np.zeros((n + 1, n + 1))
     joint[:n, :n], joint[:n, n] = scaled.A, scaled.B[:, 0]
+    if delay:
+        return _sample_late(joint, scaled.C[0], intervals, delay)
     distinct, which = np.unique(intervals, return_inverse=True)
     held = scipy.linalg.expm(joint * distinct[:, None, None])[which]
     return PeriodicPlant(held[:, :n, :n], held[:, :n, n], scaled.C[0], intervals)
+
+
+def _sample_late(
+    joint: np.ndarray, c: np.ndarray, intervals: np.ndarray, delay: float
+) -> PeriodicPlant:
+    """States [x(k), v(k-1) .. v(k-D)]: within interval k, v(k-j) acts until v(k-j+1) arrives."""
+    n, period = c.size, intervals.size
+    arrival, ages = np.full(period, delay), [np.full(period, delay)]
+    while arrival.max() > 0:
+        arrival = arrival - np.roll(intervals, len(ages))
+        ages.append(arrival)
+    past = len(ages) - 1
+    a, b = np.zeros((period, n + past, n + past)), np.zeros((period, n + past))
+    a[:, :n, :n] = scipy.linalg.expm(joint * intervals[:, None, None])[:, :n, :n]
+    a[:, n + 1 :, n:-1] = np.eye(past - 1)
+    b[:, n] = 1.0
+    for j, age in enumerate(ages):
+        first = np.clip(age, 0, intervals)
+        last = np.clip(ages[j - 1], 0, intervals) if j else intervals
+        held = scipy.linalg.expm(joint * (last - first)[:, None, None])[:, :n, n]
+        rest = scipy.linalg.expm(joint * (intervals - last)[:, None, None])[:, :n, :n]
+        acts = (rest @ held[:, :, None])[:, :, 0]
+        if j:
+            a[:, :n, n + j - 1] = acts
+        else:
+            b[:, :n] = acts
+    return PeriodicPlant(a, b, np.append(c, np.zeros(past)), intervals)
 
 
 def balanced(system: control.StateSpace) -> control.StateSpace:
@@ -894,21 +928,19 @@ def transient_growth(loop: PeriodicLoop, periods: ArrayLike, iterations: int = 1
 def noise_gain(loop: PeriodicLoop, output: str = "output") -> float:
     """Stationary standard deviation per unit of white measurement noise, rms over the period.
 
-    `output` is "output" or "repetitive" (u).  The covariance of the state is summed by doubling,
-    with dense matrices: up to some two thousand samples per period.
+    `output` is "output", "repetitive" (u) or "measured_error", which holds the noise itself: the
+    output of a sample knows nothing yet of the noise of that sample, so their variances add.
+    The covariance of the state is summed by doubling, with dense matrices, until what is added
+    is below 1e-11 of it: up to some two thousand samples per period.
     Raises ValueError when the sum does not settle, and for a longer period.
     """
-    if output not in ("output", "repetitive"):
-        raise ValueError(f"output {output!r}: choose 'output' or 'repetitive'")
+    if output not in ("output", "repetitive", "measured_error"):
+        raise ValueError(f"output {output!r}: choose 'output', 'measured_error' or 'repetitive'")
     if loop.period > 2500:
         raise ValueError(f"period {loop.period}: too long for dense matrices; simulate with noise")
-    once, n = _one_period(loop), loop.period
-    free, driven = (
-        once.run(np.eye(once.size), None),
-        once.run(np.zeros((once.size, n)), np.eye(n)),
-    )
-    seen_free, seen_driven = (_seen(loop, once, line, output) for line in (free, driven))
-    power, entry = free[once.last], driven[once.last]
+    ends, seen = _answers(loop, repetitive=output == "repetitive")
+    states = len(ends)
+    power, entry = ends[:, :states], ends[:, states:]
     covariance = entry @ entry.T
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(60):
@@ -916,19 +948,37 @@ def noise_gain(loop: PeriodicLoop, output: str = "output") -> float:
             covariance = covariance + added
             if not np.all(np.isfinite(covariance)):
                 break
-            if np.trace(added) <= 1e-13 * np.trace(covariance):
-                variance = np.sum((seen_free @ covariance) * seen_free) + np.sum(seen_driven**2)
-                return float(np.sqrt(variance / n))
+            if np.trace(added) <= 1e-11 * np.trace(covariance):
+                free, driven = seen[:, :states], seen[:, states:]
+                variance = np.sum((free @ covariance) * free) + np.sum(driven**2)
+                return float(np.sqrt(variance / loop.period + (output == "measured_error")))
             power = power @ power
     raise ValueError("the response to noise does not settle: the loop is not stable")
 
 
-def _seen(loop: PeriodicLoop, once: _Period, timeline: np.ndarray, output: str) -> np.ndarray:
-    now = timeline[once.size :].reshape(loop.period, once.step, -1)
-    if output == "repetitive":
-        return now[:, 0]
-    x = np.concatenate([timeline[None, : once.order], now[:-1, 3:]])
-    return np.einsum("i,kij->kj", loop.plant.c, x)
+def _answers(loop: PeriodicLoop, repetitive: bool) -> tuple[np.ndarray, np.ndarray]:
+    """One period from every unit state, then from a unit of noise at every sample.
+
+    Returns the states at its end, as those of `one_period_map`, and the outputs (or u) on the way.
+    """
+    n, order, advance, half = loop.period, loop.plant.order, loop.advance, loop.half
+    reach, memory = max(advance, loop.taps.shape[1] - 1), n - advance + half
+    states = order + reach + memory
+    x, u, w = np.split(np.zeros((states + 2 * n, states + n)), [order, order + reach + n])
+    x[:, :order] = np.eye(order)
+    u[:reach, order : order + reach] = np.eye(reach)
+    w[:memory, order + reach : states] = np.eye(memory)
+    seen = np.empty((n, states + n))
+    for k in range(n):
+        now, long = reach + k, memory + k - n + advance
+        u[now] = loop.q[k] @ w[long - half : long + half + 1]
+        y = loop.plant.c @ x
+        w[memory + k] = u[now - advance] - y
+        w[memory + k, states + k] -= 1.0
+        command = loop.taps[k, ::-1] @ u[now - loop.taps.shape[1] + 1 : now + 1]
+        x = loop.plant.a[k] @ x + np.outer(loop.plant.b[k], command)
+        seen[k] = u[now] if repetitive else y
+    return np.concatenate([x, u[-reach:], w[-memory:]]), seen
 
 
 def frozen_symbol(loop: PeriodicLoop, z: ArrayLike) -> np.ndarray:
