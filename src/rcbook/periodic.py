@@ -29,7 +29,7 @@ Source: Hanson and Tsao (2000), eqs 1-13 and appendix.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 import control
@@ -501,14 +501,22 @@ def closed_loop_matrix(loop: PeriodicLoop, k: int) -> np.ndarray:
     return matrix
 
 
-def product_of_matrices(loop: PeriodicLoop) -> np.ndarray:
+Multiply = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def multiplications(left: np.ndarray, right: np.ndarray) -> int:
+    """Multiplications of numbers in the product of two full matrices."""
+    return left.shape[0] * left.shape[1] * right.shape[1]
+
+
+def product_of_matrices(loop: PeriodicLoop, multiply: Multiply = np.matmul) -> np.ndarray:
     """Product of the N closed-loop matrices, by brute force: O(N^4) work.
 
-    Source: Hanson and Tsao (2000), eq. 10.
+    `multiply` may count what it does.  Source: Hanson and Tsao (2000), eq. 10.
     """
     product = closed_loop_matrix(loop, 0)
     for k in range(1, loop.period):
-        product = closed_loop_matrix(loop, k) @ product
+        product = multiply(closed_loop_matrix(loop, k), product)
     return product
 
 
@@ -536,15 +544,81 @@ def lift(loop: PeriodicLoop) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.nda
     return state[:, :states], state[:, states:], outputs[:, :states], outputs[:, states:]
 
 
-def lifted(loop: PeriodicLoop) -> np.ndarray:
+def lift_by_products(
+    loop: PeriodicLoop, block: str, multiply: Multiply = np.matmul, carried: bool = False
+) -> np.ndarray:
+    """Block "A", "B", "C" or "D" of `lift`, as the paper forms it: from products of matrices.
+
+    Each entry forms its own transition matrix, or, `carried`, prolongs that of the one before.
+    `multiply` may count what it does.  Source: Hanson and Tsao (2000), eqs 7 and A3-A7.
+    Raises ValueError for another block.
+    """
+    a, b, c, d = _compensated_plant(loop)
+    n = loop.period
+    if block == "A":
+        return _products(a, multiply, carried=True)[-1]
+    if block == "B":
+        back = _products([each.T for each in a[:0:-1]], multiply, carried)
+        return np.hstack([*(multiply(back[n - 2 - k].T, b[k]) for k in range(n - 1)), b[-1]])
+    if block == "C":
+        ahead = _products(a[:-1], multiply, carried)
+        return np.vstack([c[0], *(multiply(c[k], ahead[k - 1]) for k in range(1, n))])
+    if block != "D":
+        raise ValueError(f"block {block!r} is none of A, B, C, D")
+    answers = np.diag(d)
+    for entered in range(n - 1):
+        ahead = _products(a[entered + 1 : -1], multiply, carried)
+        states = [b[entered], *(multiply(product, b[entered]) for product in ahead)]
+        for k, state in enumerate(states, entered + 1):
+            answers[k, entered] = multiply(c[k], state)[0, 0]
+    return answers
+
+
+def _products(matrices: list[np.ndarray], multiply: Multiply, carried: bool) -> list[np.ndarray]:
+    """matrices[i] .. matrices[0] for each i."""
+    found: list[np.ndarray] = []
+    for i, newest in enumerate(matrices):
+        if carried and found:
+            found.append(multiply(newest, found[-1]))
+            continue
+        product = matrices[0]
+        for following in matrices[1 : i + 1]:
+            product = multiply(following, product)
+        found.append(product)
+    return found
+
+
+def _compensated_plant(loop: PeriodicLoop) -> tuple[list, list, list, list]:
+    """A2, B2, C2, D2 of eq. 7 at each sample, states [G_c, G_p]."""
+    filter, size = loop.taps.shape[1] - 1, loop.plant.order
+    parts: tuple[list, list, list, list] = ([], [], [], [])
+    for k in range(loop.period):
+        a = np.zeros((filter + size,) * 2)
+        a[:filter, :filter] = np.eye(filter, k=-1)
+        a[filter:, :filter] = np.outer(loop.plant.b[k], loop.taps[k, 1:])
+        a[filter:, filter:] = loop.plant.a[k]
+        b = np.concatenate([np.eye(filter)[:1].ravel(), loop.plant.b[k] * loop.taps[k, 0]])
+        c = np.concatenate([np.zeros(filter), loop.plant.c])
+        for part, value in zip(parts, (a, b[:, None], c[None], 0.0), strict=True):
+            part.append(value)
+    return parts
+
+
+def lifted(
+    loop: PeriodicLoop, multiply: Multiply = np.matmul, carried: bool | None = None
+) -> np.ndarray:
     """One-period matrix of [G_c, G_p, u(0) .. u(N-1)] from the lifted blocks: O(N^3) work.
 
+    The blocks are those of `lift`, or for a `carried` of True or False of `lift_by_products`.
     Source: Hanson and Tsao (2000), eqs A8-A16, with A2 and B2 in A14 and D2 in A15 and A16.
     Raises ValueError when the loop has a q other than 1, which the appendix does not treat.
     """
     if loop.half or not np.all(loop.q == 1):
         raise ValueError(f"q = {loop.q[0]}: the appendix has no q; use one_period_map")
-    a, b, c, d = lift(loop)
+    if carried is None:
+        a, b, c, d = lift(loop)
+    else:
+        a, b, c, d = (lift_by_products(loop, block, multiply, carried) for block in "ABCD")
     ahead, late = loop.advance, loop.period - loop.advance
 
     def early(block: np.ndarray) -> np.ndarray:  # S^L: rows moved up
@@ -553,11 +627,11 @@ def lifted(loop: PeriodicLoop) -> np.ndarray:
     def delayed(block: np.ndarray) -> np.ndarray:  # D^(N-L): rows moved down
         return np.concatenate([np.zeros_like(block[:late]), block[:ahead]])
 
-    identity = np.eye(loop.period)
-    right = np.concatenate([-early(c) - delayed(c @ a), identity - early(d) - delayed(c @ b)], 1)
-    lower = scipy.linalg.solve_triangular(
-        identity + delayed(d), right, lower=True, unit_diagonal=True
-    )
+    m1 = -early(c) - delayed(multiply(c, a))
+    m2 = np.eye(loop.period) - early(d) - delayed(multiply(c, b))
+    lower, below = np.concatenate([m1, m2], axis=1), delayed(d)
+    for k in range(late + 1, loop.period):  # the rows above stand alone
+        lower[k] -= multiply(below[k : k + 1, :k], lower[:k])[0]
     return np.block([[a, b], [lower]])
 
 
