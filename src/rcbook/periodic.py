@@ -148,6 +148,28 @@ def _sample_late(
     return PeriodicPlant(a, b, np.append(c, np.zeros(past)), intervals)
 
 
+def between_samples(
+    system: control.StateSpace, intervals: ArrayLike, command: ArrayLike, parts: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times in s and outputs at `parts` instants of every interval, the first at the sample.
+
+    It is the periodic answer to a command that repeats with the intervals and is held in each.
+    Raises ValueError as `sample` does, and when command and intervals differ in length.
+    """
+    intervals = _intervals(intervals)
+    command = signal(command, "command", intervals.size)
+    pieces = np.repeat(intervals / zdomain.whole_number(parts, "parts"), parts)
+    plant, order = sample(system, pieces), system.nstates
+    rows = np.empty((pieces.size, order + 1))
+    state = np.eye(order, order + 1)  # of every unit state, and of the command from rest
+    for k in range(pieces.size):
+        rows[k] = plant.c @ state
+        state = plant.a[k] @ state
+        state[:, -1] += plant.b[k] * command[k // parts]
+    start = np.linalg.solve(np.eye(order) - state[:, :-1], state[:, -1])
+    return np.cumsum(pieces) - pieces, rows[:, :-1] @ start + rows[:, -1]
+
+
 def balanced(system: control.StateSpace) -> control.StateSpace:
     """The same plant in states scaled by powers of 2, so that nothing is rounded."""
     n = system.nstates

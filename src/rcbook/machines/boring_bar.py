@@ -78,6 +78,17 @@ def sinusoidal_intervals(nominal: float, gamma: float, n: int) -> np.ndarray:
     return nominal * (1 + gamma * np.sin(angle))
 
 
+def nose(time: ArrayLike, centre: float, width: float, period: float) -> np.ndarray:
+    """A bump of height 1 once in every period (s): exp(-(t - centre)^2/(2 width^2)), times in s.
+
+    Raises ValueError for a width or period that is not positive.
+    """
+    width = real_number(width, "width", positive=True)
+    period = real_number(period, "period", positive=True)
+    away = np.asarray(time, dtype=float) - real_number(centre, "centre")
+    return np.exp(-0.5 * (((away + period / 2) % period - period / 2) / width) ** 2)
+
+
 def speed_law(time: ArrayLike, nominal: float, amplitude: float, frequency: float) -> np.ndarray:
     """Spindle speed nominal + amplitude sin(2 pi frequency t), speeds in rad/s, frequency in Hz.
 
