@@ -112,6 +112,8 @@ REFUSED = [
         "3.33333333 turns per period of the speed is no whole number; choose rvf",
     ),
     ("reference", lambda: BAR.reference(2, 0), "n = 0"),
+    ("width", lambda: boring_bar.nose(0.0, 0.0, 0.0, 1.0), r"width = 0\.0"),
+    ("period", lambda: boring_bar.nose(0.0, 0.0, 1.0, -1.0), r"period = -1\.0"),
 ]
 
 

@@ -593,6 +593,11 @@ REFUSED = [
     ("unstable", lambda: periodic.noise_gain(bar_loop(32, 0.9)), "does not settle"),
     ("output", lambda: periodic.noise_gain(LOOP, "error"), "'error': choose"),
     ("growth", lambda: periodic.transient_growth(LOOP, [0]), "periods = 0"),
+    ("early", lambda: periodic.sample(BAR.plant, [1e-4], -1e-6), "delay = -1e-06 s must lie"),
+    ("too late", lambda: periodic.sample(BAR.plant, [1e-4], 2e-4), "between 0 and one period"),
+    ("block", lambda: periodic.lift_by_products(bar_loop(20, 0), "E"), "'E' is none of A, B"),
+    ("command", lambda: periodic.between_samples(BAR.plant, [1e-4], [1, 2], 3), "2 samples"),
+    ("parts", lambda: periodic.between_samples(BAR.plant, [1e-4], [1.0], 0), "parts = 0"),
 ]
 
 
