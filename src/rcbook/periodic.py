@@ -151,17 +151,23 @@ def _sample_late(
 
 
 def between_samples(
-    system: control.StateSpace, intervals: ArrayLike, command: ArrayLike, parts: int
+    system: control.StateSpace,
+    intervals: ArrayLike,
+    command: ArrayLike,
+    parts: int,
+    delay: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Times in s and outputs at `parts` instants of every interval, the first at the sample.
 
-    It is the periodic answer to a command that repeats with the intervals and is held in each.
+    It is the periodic answer to a command that repeats with the intervals and is held in each,
+    and that arrives `delay` s late.
     Raises ValueError as `sample` does, and when command and intervals differ in length.
     """
     intervals = _intervals(intervals)
     command = signal(command, "command", intervals.size)
     pieces = np.repeat(intervals / zdomain.whole_number(parts, "parts"), parts)
-    plant, order = sample(system, pieces), system.nstates
+    plant = sample(system, pieces, delay)
+    order = plant.order
     rows = np.empty((pieces.size, order + 1))
     state = np.eye(order, order + 1)  # of every unit state, and of the command from rest
     for k in range(pieces.size):
