@@ -661,7 +661,7 @@ def with_spreads(spreads, standstill=None):
     empty = np.zeros(401)
     force = np.append(0, high)
     return face_mill.Run(
-        one, *[empty] * 4, force, *[empty] * 3, seen=empty, command=empty, standstill=standstill
+        one, *[empty] * 4, force, *[empty] * 5, seen=empty, command=empty, standstill=standstill
     )
 
 

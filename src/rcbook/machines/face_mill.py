@@ -26,6 +26,7 @@ ENTRIES = ("one by one", "at once")
 TORQUES = ("memory", "instantaneous")
 LIMITS = ("clamp", "hold")
 LOGGED = ("time", "speed", "current", "force", "torque", "out_of_cut", "saturated")
+LOGGED += ("lowest_current", "highest_current")
 ABREAST = 256  # runs computed side by side, few enough for the processor's cache
 STANDSTILL = 0.01  # of the nominal speed
 NEWTON_STEPS = 30
@@ -256,9 +257,10 @@ class Experiment:
     keep_negative: bool = False
     limit: str = "clamp"
     substeps: int = 12  # steps of integration per sample
+    inner: int = 1  # points of every step at which extremes of the current are looked for
 
     def __post_init__(self) -> None:
-        for name in ("controlled", "engaged", "turns", "substeps"):
+        for name in ("controlled", "engaged", "turns", "substeps", "inner"):
             object.__setattr__(self, name, whole_number(getattr(self, name), name))
         for name, allowed in (
             ("output", OUTPUTS),
@@ -296,6 +298,8 @@ class Run:
     torque: np.ndarray  # N m
     out_of_cut: np.ndarray  # number of teeth between entry and exit that met no chip
     saturated: np.ndarray  # 1 where the current command was limited in the step before, else 0
+    lowest_current: np.ndarray  # A, within the step before
+    highest_current: np.ndarray  # A
     seen: np.ndarray  # N or N m, what the controller was shown at each sample
     command: np.ndarray  # V, speed command from each sample to the next
     standstill: float | None  # revolutions after which the spindle stood still, if it did
@@ -323,13 +327,17 @@ def simulate_all(experiments: Sequence[Experiment]) -> list[Run]:
     reached.  So fast modes of the drive limit no step, and halving the step quarters the error
     where teeth enter and leave at the ends of steps; other entries and exits, and the switching of
     the limit, are met to within a step.
+
+    The current overshoots just behind a sampling instant, in less time than a step takes.  Its
+    extremes are therefore looked for at `inner` points of every step's exact solution.
     Source: Tsao and Pong (1991), eqs 6-9 and 12.
     """
     experiments = list(experiments)
     alike: dict[tuple, list[int]] = {}
     for i, one in enumerate(experiments):
         mill = one.mill
-        key = (mill.drive, mill.teeth, mill.samples_per_pitch, one.substeps, one.turns)
+        steps = (one.substeps, one.inner, one.turns)
+        key = (mill.drive, mill.teeth, mill.samples_per_pitch, *steps)
         alike.setdefault(key, []).append(i)
     runs: dict[int, Run] = {}
     for members in alike.values():
@@ -354,6 +362,31 @@ def tooth_forces(run: Run) -> np.ndarray:
 def pitch_peaks(run: Run) -> np.ndarray:
     """Largest tooth force in N within each tooth pitch, shape (turns, teeth)."""
     return run.force[1:].reshape(run.experiment.turns, run.experiment.mill.teeth, -1).max(axis=2)
+
+
+def pitch_torques(run: Run) -> np.ndarray:
+    """Mean cutting torque in N m over each tooth pitch, shape (turns, teeth).
+
+    The passing of the teeth of an even cutter leaves no trace in it.
+    """
+    return run.torque[1:].reshape(run.experiment.turns, run.experiment.mill.teeth, -1).mean(axis=2)
+
+
+def peak_spreads(run: Run) -> np.ndarray:
+    """Largest minus smallest of the peaks per tooth pitch in N, by turns; infinite once at rest."""
+    return np.nan_to_num(np.ptp(pitch_peaks(run), axis=1), nan=np.inf)
+
+
+def torque_spreads(run: Run) -> np.ndarray:
+    """Largest minus smallest mean torque of a pitch in N m, by turns; infinite once at rest."""
+    return np.nan_to_num(np.ptp(pitch_torques(run), axis=1), nan=np.inf)
+
+
+def current_swing(run: Run, turn: int = -1) -> float:
+    """Half the range of the current in A within a turn; infinite once at rest."""
+    part = run.during(turn)
+    whole = run.highest_current[part].max() - run.lowest_current[part].min()
+    return float(np.nan_to_num(whole, nan=np.inf)) / 2
 
 
 def outcome(run: Run) -> str:
@@ -395,8 +428,8 @@ def _side_by_side(group: list[Experiment]) -> list[Run]:
     # The clock at the ends and in the middle of the steps, begun one tooth pitch before the start.
     clock = np.arange(-back, steps + 1)[:, None] * angle / rest[0]
     middle = clock[:-1] + angle / 2 / rest[0]
-    log = np.zeros((steps + 1, 7, len(group)))
-    log[0, :3] = clock[back], state[0], state[1]
+    log = np.zeros((steps + 1, len(LOGGED), len(group)))
+    log[0, :3], log[0, 7:] = (clock[back], state[0], state[1]), state[1]
     seen, error, sent = np.zeros((3, law.reach + steps // every, len(group)))
     moving = np.ones(len(group), dtype=bool)
     for step in range(steps):
@@ -411,14 +444,17 @@ def _side_by_side(group: list[Experiment]) -> list[Run]:
         guess = clock[now] + angle / 2 / speed
         _, load, _ = cut.loads(2 * step + 1, guess - middle[step], ahead)
         inputs = np.array([law.base + sent[k], load])
-        seconds, after, limited = _turn(modes, state, inputs, law.holds, angle)
+        seconds, after, extremes, limited = _turn(
+            modes, state, inputs, law.holds, angle, group[0].inner
+        )
         moving = moving & (after[0] > STANDSTILL * rest[0])
         state = np.where(moving, after, rest)
         clock[now + 1] = clock[now] + np.where(moving, seconds, angle / rest[0])
         bend = angle / 8 * (1 / speed - 1 / state[0])
         middle[now] = (clock[now] + clock[now + 1]) / 2 + bend
         loads = cut.loads(2 * step + 2, clock[now + 1] - clock[step + 1], state[0])
-        log[step + 1] = np.where(moving, (clock[now + 1], *state[:2], *loads, limited), np.nan)
+        row = (clock[now + 1], *state[:2], *loads, limited, *extremes)
+        log[step + 1] = np.where(moving, row, np.nan)
     return [_run(one, i, log, seen, law.base + sent, law.reach) for i, one in enumerate(group)]
 
 
@@ -459,28 +495,34 @@ def _modes(drive: SpindleDrive) -> _Modes:
 
 
 def _turn(
-    modes: _Modes, state: np.ndarray, inputs: np.ndarray, holds: np.ndarray, angle: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Seconds that the spindle takes for an angle, its state then, and whether it was limited."""
+    modes: _Modes,
+    state: np.ndarray,
+    inputs: np.ndarray,
+    holds: np.ndarray,
+    angle: float,
+    inner: int,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Seconds that the spindle takes for an angle, its state then, the smallest and the largest
+    current on the way at `inner` points, and whether the current command was limited."""
     wanted = modes.wanted @ state + modes.wanted_by_command * inputs[0]
     limited = np.abs(wanted) > modes.limit
     which = np.where(limited, 1 + holds, 0)
     if not limited.any():
-        seconds, after = _turn_in_mode(modes, 0, state, inputs, angle)
-        return seconds, after, limited
+        return *_turn_in_mode(modes, 0, state, inputs, angle, inner), limited
     inputs = np.vstack([inputs, np.sign(wanted) * modes.limit])
     seconds, after = np.empty(state.shape[1]), np.empty(state.shape)
+    extremes = np.empty((2, state.shape[1]))
     for mode in np.unique(which):
         runs = which == mode
-        seconds[runs], after[:, runs] = _turn_in_mode(
-            modes, mode, state[:, runs], inputs[:, runs], angle
+        seconds[runs], after[:, runs], extremes[:, runs] = _turn_in_mode(
+            modes, mode, state[:, runs], inputs[:, runs], angle, inner
         )
-    return seconds, after, limited
+    return seconds, after, extremes, limited
 
 
 def _turn_in_mode(
-    modes: _Modes, mode: int, state: np.ndarray, inputs: np.ndarray, angle: float
-) -> tuple[np.ndarray, np.ndarray]:
+    modes: _Modes, mode: int, state: np.ndarray, inputs: np.ndarray, angle: float, inner: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Newton's method for the time at which the angle is reached, on the exact solution."""
     poles, right = modes.poles[mode][:, None], modes.right[mode]
     start = modes.left[mode] @ state
@@ -502,7 +544,14 @@ def _turn_in_mode(
             seconds = seconds - miss / speed
         after = (right @ (start * (1 + rise) + drive * once)).real
         reached = (np.abs(miss) < 1e-9 * angle) & (seconds > 0)
-    return seconds, np.where(reached, after, 0.0)
+        along = [after[1]]
+        for part in np.arange(1, inner) / inner:
+            x = poles * (part * seconds)
+            rise = np.expm1(x)
+            once = np.divide(rise, poles, out=part * seconds + 0 * x, where=decays)
+            along.append((right[1] @ (start * (1 + rise) + drive * once)).real)
+    extremes = np.array([np.min(along, axis=0), np.max(along, axis=0)])
+    return seconds, np.where(reached, after, 0.0), extremes
 
 
 class _Cut(NamedTuple):
