@@ -197,14 +197,20 @@ def _crossing(claim: ledger.Claim, kept: Trial | None, flips: Trial) -> float | 
     None for what is no number, where no number crosses, and where one has moved so far beyond its
     tolerance that a line says nothing.
     """
+    claim = claim.corrected if claim.expected == ledger.CORRECTED else claim
     tolerances = ledger.tolerances(claim)
     if kept is None or tolerances is None or claim.kind == "bound":
         return None
     start, end = kept.size or 0.0, flips.size
-    rows = (claim.printed.split(";"), tolerances, kept.computed[claim.id], flips.computed[claim.id])
+    rows = (
+        list(claim.parsed.numbers),
+        tolerances,
+        kept.computed[claim.id],
+        flips.computed[claim.id],
+    )
     printed, tolerances, before, after = (x if isinstance(x, list) else [x] for x in rows)
     crossings = []
-    for p, tolerance, a, b in zip(printed, tolerances, before, after, strict=True):
+    for p, tolerance, a, b in zip(claim.parsed.numbers, tolerances, before, after, strict=True):
         numbers = isinstance(a, int | float) and isinstance(b, int | float) and a != b
         if numbers and max(abs(a - float(p)), abs(b - float(p))) <= SHORT * tolerance:
             shares = ((float(p) + sign * tolerance - a) / (b - a) for sign in (-1, 1))

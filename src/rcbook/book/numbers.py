@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -134,24 +135,27 @@ def rewrite(project: Project, typed: Mapping[str, Sequence]) -> int:
         if not wrong:
             continue
         path = project.notebooks / name
-        notebook = nbformat.read(path, as_version=4)
-        for cell in notebook.cells:
+        notebook = json.loads(path.read_text(encoding="utf-8"))
+        for cell in notebook["cells"]:
             for alt in (False, True):
-                values = {n.start: n.computed for n in wrong if (n.cell, n.alt) == (cell.id, alt)}
-                _put(cell, alt, values)
-        write(path, nbformat.writes(notebook) + "\n")
+                here = (cell["id"], alt)
+                _put(cell, alt, {n.start: n.computed for n in wrong if (n.cell, n.alt) == here})
+        write(path, json.dumps(notebook, indent=1, ensure_ascii=False) + "\n")
         changed += len(wrong)
     return changed
 
 
-def _put(cell: nbformat.NotebookNode, alt: bool, values: Mapping[int, str]) -> None:
+def _put(cell: dict, alt: bool, values: Mapping[int, str]) -> None:
+    """Rewrite one text of a cell as it stands in its file, where a source may be in lines."""
     if not values:
         return
     if alt:
-        image = cell.metadata["mystnb"]["image"]
+        image = cell["metadata"]["mystnb"]["image"]
         image["alt"] = marks.rewritten(image["alt"], values)
-    else:
-        cell.source = marks.rewritten(cell.source, values)
+        return
+    lines = isinstance(cell["source"], list)
+    text = marks.rewritten("".join(cell["source"]), values)
+    cell["source"] = text.splitlines(keepends=True) if lines else text
 
 
 def table(places: Sequence[Place]) -> str:
