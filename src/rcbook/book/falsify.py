@@ -202,13 +202,8 @@ def _crossing(claim: ledger.Claim, kept: Trial | None, flips: Trial) -> float | 
     if kept is None or tolerances is None or claim.kind == "bound":
         return None
     start, end = kept.size or 0.0, flips.size
-    rows = (
-        list(claim.parsed.numbers),
-        tolerances,
-        kept.computed[claim.id],
-        flips.computed[claim.id],
-    )
-    printed, tolerances, before, after = (x if isinstance(x, list) else [x] for x in rows)
+    values = (tolerances, kept.computed[claim.id], flips.computed[claim.id])
+    tolerances, before, after = (x if isinstance(x, list) else [x] for x in values)
     crossings = []
     for p, tolerance, a, b in zip(claim.parsed.numbers, tolerances, before, after, strict=True):
         numbers = isinstance(a, int | float) and isinstance(b, int | float) and a != b
