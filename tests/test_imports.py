@@ -12,7 +12,7 @@ LAYERS = (
     {"zdomain", "signals", "ledger"},
     {"identify", "repetitive", "learning", "periodic"},
     {"machines"},
-    {"plot", "diagrams"},
+    {"pictures"},
     {"book", "cli"},
 )
 APART = ({"machines"}, {"identify", "repetitive", "learning", "periodic"})

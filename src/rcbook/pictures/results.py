@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from rcbook.machines import face_mill
+from rcbook.machines.peripheral_mill import PeripheralMill
 from rcbook.repetitive import Run
 from rcbook.zdomain import Plant
 
@@ -28,7 +29,7 @@ GREY = "0.55"
 
 def use_style() -> None:
     """Switch Matplotlib to the style of the book."""
-    plt.style.use(resources.files("rcbook").joinpath("rcbook.mplstyle"))
+    plt.style.use(resources.files("rcbook.pictures").joinpath("rcbook.mplstyle"))
 
 
 def draw_signal(ax: Axes, run: Run, name: str = "output", label: str | None = None, **line) -> Axes:
@@ -67,6 +68,32 @@ def draw_cut(axes: Sequence[Axes], run: face_mill.Run, label: str | None = None,
         ax.set_ylabel(name)
         ax.margins(x=0)
     axes[-1].set_xlabel("revolutions of the cutter")
+
+
+def draw_waviness(ax: Axes, mill: PeripheralMill, eccentricity: float, turns: int = 3) -> Axes:
+    """Plot the profile that the teeth of a cutter leave when it runs out by `eccentricity` in m.
+
+    Each tooth leaves an arc of its own radius, `radius + eccentricity cos(2 pi i / flutes)`, and
+    the deepest arc remains; feed is drawn in mm, height in micrometres.
+
+    Raises ValueError when the arcs are too short for the length drawn.
+    """
+    radius, flutes = mill.cutter_diameter / 2, mill.flutes
+    feed_per_turn = mill.feed_speed / mill.spindle_frequency
+    if (turns + 1) * feed_per_turn >= radius - abs(eccentricity):
+        raise ValueError(
+            f"a cutter of radius {radius:g} m does not reach over {turns} turns of feed "
+            f"{feed_per_turn:g} m: draw fewer turns, or check that all lengths are in metres"
+        )
+    x = np.linspace(0.0, turns * feed_per_turn, 80 * flutes * turns + 1)  # hits every crest
+    tooth = np.arange(-flutes, (turns + 1) * flutes + 1)
+    reach = radius + eccentricity * np.cos(2 * np.pi * tooth / flutes)
+    behind = x[:, None] - tooth * feed_per_turn / flutes
+    height = np.min(radius - np.sqrt(reach**2 - behind**2), axis=1)
+    ax.plot(1e3 * x, 1e6 * height, label=f"eccentricity {1e6 * eccentricity:g} µm")
+    ax.set_xlabel("distance along the feed (mm)")
+    ax.set_ylabel("height (µm)")
+    return ax
 
 
 def draw_unit_circle(ax: Axes) -> Axes:

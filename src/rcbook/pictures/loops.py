@@ -1,0 +1,212 @@
+"""The loops of the case studies: each is a table of items and of the wires between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+
+from rcbook.machines.face_mill import EIGHT_TEETH, FaceMill
+from rcbook.machines.spindle_drive import TSAO_PONG1991, SpindleDrive
+from rcbook.pictures import blocks
+from rcbook.pictures.blocks import Block, Frame, Node, Sum, Wire, path, row
+from rcbook.pictures.sketch import DISTURBED, FOCUS, PAPER, PLANT
+
+_ADD = {"w": "+", "n": "+"}  # signs of a sum that is entered from the left and from above
+
+
+def draw_feedback_loop(
+    ax: Axes,
+    parts: Sequence[str] = ("controller", "plant"),
+    signals: Sequence[str] = ("$r$", "$e$", "$u$", "$y$"),
+    disturbance: str = "",
+    focus: bool = False,
+) -> Axes:
+    """Draw a unity feedback loop from the texts of its two blocks and its four signals in order.
+
+    A `disturbance` is added between controller and plant; `focus` tints the controller.
+    """
+    (controller, plant), (reference, error, command, output) = parts, signals
+    block = Block("controller", controller, fill=FOCUS if focus else PAPER)
+    load = [Sum("load", signs=_ADD), ""] if disturbance else []
+    end = [*load, Block("plant", plant, fill=PLANT), "", Node("out"), output]
+    items, wires = row(reference, Sum("error"), error, block, command, *end)
+    wires.append(Wire("out", "error", via=-1.3))
+    if disturbance:
+        wires.append(Wire((_at(items, "load"), 1.1), "load", disturbance, color=DISTURBED))
+    return blocks.draw_block_diagram(ax, items, wires)
+
+
+def draw_cascade_loop(
+    ax: Axes,
+    parts: Sequence[str] = ("outer", "inner", "plant"),
+    signals: Sequence[str] = ("$r$", "$e$", "$v$", r"$\epsilon$", "$u$", "$y$"),
+    disturbance: str = "$w$",
+    inner_loop: str = "inner loop",
+) -> Axes:
+    """Draw an outer controller that sets the reference of an inner loop, which is framed.
+
+    Texts are those of the three blocks and the six signals in order, of the `disturbance` at the
+    plant's input and of the inner loop.
+    """
+    (outer, inner, plant), (reference, e, v, epsilon, u, output) = parts, signals
+    items, wires = row(
+        *(reference, Sum("outer error"), e, Block("outer", outer, fill=FOCUS), v),
+        *(Sum("error"), epsilon, Block("inner", inner), u, Sum("load", signs=_ADD), ""),
+        *(Block("plant", plant, fill=PLANT), "", Node("inner out"), "", Node("out"), output),
+    )
+    left, right = _at(items, "error") - 0.6, _at(items, "inner out") + 0.22
+    items.append(Frame("inner loop", ((left + right) / 2, -0.375), right - left, 2.35))
+    wires += [
+        Wire("inner out", "error", inner_loop, via=-1.3),
+        Wire("out", "outer error", via=-2.0),
+        Wire((_at(items, "load"), 1.1), "load", disturbance, color=DISTURBED),
+    ]
+    return blocks.draw_block_diagram(ax, items, wires)
+
+
+def _at(items: Sequence[blocks.Item], name: str) -> float:
+    """Where in a row an item is."""
+    return next(item.xy[0] for item in items if item.name == name)
+
+
+def draw_learning_loop(ax: Axes, law: str = "$H$", plant: str = "$G$") -> Axes:
+    """Draw learning from pass to pass: the error through the law corrects the next command."""
+    items = [
+        Block("memory", "memory of\none pass", (0.0, 0.0), FOCUS),
+        Node("command", (3.2, 0.0)),
+        Block("plant", plant, (5.4, 0.0), PLANT),
+        Sum("error", (8.0, 0.0), {"w": "−", "n": "+"}),
+        Block("law", law, (5.4, -2.0), FOCUS),
+        Sum("corrected", (3.2, -2.0), {"n": "+", "e": "+"}),
+    ]
+    wires = [
+        *path("memory", "$y_{m,L}$", "command", "", "plant", "$y_L$", "error"),
+        Wire((8.0, 1.3), "error", "$y_r$"),
+        Wire("error", "law", "$e_L$", via=-2.0),
+        *path("law", "", "corrected"),
+        Wire("command", "corrected"),
+        Wire("corrected", "memory", "$y_{m,L+1}$", via=-2.0),
+    ]
+    return blocks.draw_block_diagram(ax, items, wires)
+
+
+def draw_repetitive_generator(ax: Axes) -> Axes:
+    """Draw the inside of a repetitive controller, `k_r q z^-(N-d) C / (1 - q z^-N)` as a whole.
+
+    The filter q and the advance nu of the inverse C lie inside the delay of one period.
+    """
+    items, wires = row(
+        *("$e$", Block("gain", "$k_r$"), "", Sum("sum", signs={"w": "+", "s": "+"}), ""),
+        *(Block("memory", r"$q(z)\,z^{-(N-d-\nu)}$", fill=FOCUS), "", Node("tap"), ""),
+        *(Block("compensator", r"$z^{-\nu}\,C(z)$"), "$u$"),
+    )
+    items.append(Block("rest", r"$z^{-(d+\nu)}$", (_at(items, "memory"), -1.5), FOCUS))
+    wires += [Wire("tap", "rest", via=-1.5), Wire("rest", "sum", via=-1.5)]
+    return blocks.draw_block_diagram(ax, items, wires)
+
+
+def draw_spindle_drive(ax: Axes, drive: SpindleDrive = TSAO_PONG1991) -> Axes:
+    """Draw the cascade of a spindle drive, from speed command to speed, and the cut as its load.
+
+    The controllers are above, from left to right; motor and spindle are below, from right to left.
+    """
+    tall, limit = {"height": 1.4}, {"title": "current limit", "icon": blocks.LIMITED}
+    proportional = r"$K_{pv}+\dfrac{K_{iv}}{s}$"
+    current = r"$K_u\left(K_{pi}+\dfrac{K_{ii}}{s}\right)$"
+    items = [
+        Sum("speed error", (1.9, 0.0)),
+        Block("velocity", proportional, (4.4, 0.0), title="velocity control", **tall),
+        Block("limit", f"{drive.current_limit:g} A", (7.4, 0.0), **limit, **tall),
+        Sum("current error", (9.8, 0.0)),
+        Block("current", current, (12.3, 0.0), title="current control", **tall),
+        Sum("voltage", (15.6, -3.5), {"n": "+", "s": "−"}),
+        Block("motor", r"$\dfrac{1}{L_a s+R_a}$", (12.6, -3.5), PLANT, title="armature", **tall),
+        Node("i", (9.8, -3.5)),
+        Block("sensor", "$K_f$", (9.8, -1.75)),
+        Block("torque", "$C_{w1}$", (8.4, -3.5), PLANT),
+        Sum("torque error", (6.6, -3.5), {"e": "+", "s": "−"}),
+        Block("inertia", r"$\dfrac{1}{Js+B}$", (4.7, -3.5), PLANT, title="spindle", **tall),
+        Node("cut off", (3.0, -3.5)),
+        Node("w", (1.9, -3.5)),
+        Block("tacho", r"$\dfrac{C_{wt}}{T_g s+1}$", (1.9, -1.75), **tall),
+        Block("cut", "cut $G_d$", (4.7, -5.1), FOCUS),
+        Block("emf", "$C_{w2}$", (8.4, -6.2), PLANT),
+    ]
+    wires = [
+        *path((0.0, 0.0), "$U_w^*$", "speed error", "", "velocity", "", "limit"),
+        *path("limit", "$U_i^*$", "current error", "", "current", "voltage", "voltage"),
+        *path("voltage", "", "motor", "$i$", "i", "", "sensor", "", "current error"),
+        *path("i", "", "torque", "", "torque error", "", "inertia", "", "cut off", "", "w"),
+        *path("w", "", "tacho", "", "speed error"),
+        Wire("w", (0.0, -3.5), "$w$"),
+        Wire("cut off", "cut", via=-5.1, dashed=True),
+        Wire("cut", "torque error", r"$T_\mathrm{cut}$", color=DISTURBED, dashed=True),
+        *(Wire("w", "emf", via=-6.2), Wire("emf", "voltage", "back EMF")),
+    ]
+    return blocks.draw_block_diagram(ax, items, wires)
+
+
+def draw_angle_loop(ax: Axes, mill: FaceMill = EIGHT_TEETH) -> Axes:
+    """Draw the repetitive loop that samples at equal steps of the cutter's turn.
+
+    Above is the controller `L_n F z^-N C / (1 - F z^-N)`, from left to right; below, from right to
+    left, is what turns with the cutter.
+    """
+    step, size = f"{360 / mill.samples_per_turn:g}°", {"width": 2.0, "height": 1.5}
+    items = [
+        Sum("error", (1.9, 0.0)),
+        Block("gain", "$L_n$", (3.7, 0.0), FOCUS),
+        Sum("learned", (5.4, 0.0), _ADD),
+        Block("memory", r"$F(z^{-1})\,z^{-N}$", (7.9, 0.0), FOCUS, title="memory of a turn"),
+        Node("tap", (9.95, 0.0)),
+        Block("inverse", "$C(z^{-1})$", (11.5, 0.0), FOCUS),
+        Sum("command", (13.6, 0.0), _ADD),
+        Block("hold", f"hold {step}", (15.6, -3.4), icon=blocks.HELD, **size),
+        Block("drive", "spindle\ndrive", (12.25, -3.4), PLANT, **size),
+        Block("cut", "cut", (9.0, -3.4), PLANT, **size),
+        Block("largest", "max over\nteeth", (5.75, -3.4), **size),
+        Block("sampler", f"sampled\nevery {step}", (1.9, -3.4), **size),
+        Frame("angle", (9.0, -3.55), 9.0, 3.2, title=r"in the cutter angle $\theta$"),
+    ]
+    wires = [
+        *path((0.0, 0.0), "$F_0$", "error", "", "gain", "", "learned", "", "memory", "", "tap"),
+        *path("tap", "", "inverse", "", "command", "$U_w^*(k)$", "hold", "", "drive", "$w$", "cut"),
+        *path("cut", "$F_{ti}$", "largest", r"$F_{t\max}$", "sampler", "", "error"),
+        Wire("tap", "learned", via=1.55),
+        Wire((13.6, 1.2), "command", "nominal $U_0$"),
+        Wire("cut", "drive", r"$T_\mathrm{cut}$", via=-4.8, dashed=True),
+        Wire((9.0, -1.75), "cut", r"runout $\Delta_i$", color=DISTURBED),
+    ]
+    return blocks.draw_block_diagram(ax, items, wires)
+
+
+def draw_periodic_loop(ax: Axes) -> Axes:
+    """Draw the repetitive loop whose hold and sampler act at equal steps of the spindle's turn.
+
+    Above, from left to right, is the controller, which repeats every N samples; below, from right
+    to left, the plant in continuous time.
+    """
+    size = {"width": 2.0, "height": 1.4}
+    items = [
+        *(Sum("error", (1.7, 0.0)), Sum("learned", (4.1, 0.0), _ADD)),
+        Block("memory", r"$Q\,q^{-(N-L)}$", (7.15, 0.0), FOCUS),
+        Block("rest", "$q^{-L}$", (7.15, 1.5), FOCUS),
+        Node("tap", (9.4, 0.0)),
+        Block("compensator", "$G_c(k)$", (12.0, 0.0), FOCUS),
+        Block("hold", "hold $T(k)$", (14.4, -2.6), icon=blocks.HELD, **size),
+        Block("plant", "$G(s)$", (9.4, -2.6), PLANT, **size),
+        Block("sampler", "sampled\n$T(k)$", (4.4, -2.6), **size),
+        Node("y", (1.7, -2.6)),
+        Block("spindle", r"encoder, every $\Delta\theta$", (9.4, -4.5)),
+        Frame("period", (6.55, 0.6), 6.4, 3.6, title="memory of one period"),
+    ]
+    wires = [
+        *path((0.0, 0.0), "$r(k)$", "error", "$e(k)$", "learned", "$w(k)$", "memory", "", "tap"),
+        *path("tap", "$u(k)$", "compensator", "$v(k)$", "hold", "$v(t)$", "plant"),
+        *path("plant", "$y(t)$", "sampler", "$y(k)$", "y", "", "error"),
+        *(Wire("tap", "rest", via=1.5), Wire("rest", "learned", via=1.5)),
+        Wire("y", (0.0, -2.6)),
+        *(Wire("spindle", end, dashed=True) for end in ("hold", "sampler")),
+    ]
+    return blocks.draw_block_diagram(ax, items, wires)
