@@ -84,7 +84,7 @@ def test_the_same_drawing_gives_the_same_file(tmp_path, name):
 
 def test_every_drawing_is_handed_on_by_the_package():
     names = {name.split(",")[0] for name in LAYOUTS}
-    assert len(names) >= 13
+    assert len(names) >= 12
     assert names == {name for name in names if hasattr(pictures, name)}
     results = inspect.getmembers(pictures.results, inspect.isfunction)
     own = {n for n, f in results if f.__module__ == pictures.results.__name__ and n[0] != "_"}
@@ -255,7 +255,7 @@ def test_a_drawing_keeps_its_scale_when_the_figure_is_large():
 def test_text_and_drawing_shrink_together():
     sizes = {}
     for width in (4.0, 2.0):
-        figure, ax = rendered(pictures.draw_cascade_loop, (width, width / 2))
+        figure, ax = rendered(pictures.draw_feedback_loop, (width, width / 2))
         unit = np.ptp(ax.transData.transform([(0, 0), (1, 0)])[:, 0])
         sizes[width] = ax.texts[0].get_fontsize() * figure.dpi / unit
     assert sizes[4.0] == pytest.approx(sizes[2.0], rel=1e-6)
@@ -308,7 +308,7 @@ def test_a_line_from_words_begins_at_their_border_and_ends_at_what_they_name():
     (line,) = ax.lines
     start, end = line.get_xydata()
     assert tuple(end) == (9.0, 2.0)
-    assert start == pytest.approx((4.1 + pen.text_size("workpiece")[0] * 0.39 / pen.EM, 2.0))
+    assert start == pytest.approx((4.1 + pen.text_size("workpiece")[0] * 1.08, 2.0))
 
 
 # --- loops ---------------------------------------------------------------------------------------
@@ -333,10 +333,22 @@ def test_a_loop_has_its_texts_in_order_and_subtracts_only_the_output():
     draw = partial(pictures.draw_feedback_loop, parts=parts, signals=signals)
     runs(draw, ("$r$", "$e$", "PI", "$u$", "milling", "$F$"), ())
     assert counts(draw, "+", "−") == [1, 1]
+
+
+def test_loops_nest_and_each_controller_has_its_own_error():
     parts, signals = ("$G_r$", "PI", "milling"), ("$r$", "$e$", "$v$", "$d$", "$u$", "$F$")
-    draw = partial(pictures.draw_cascade_loop, parts=parts, signals=signals)
+    texts = {"disturbance": "$w$", "inner_loop": "closed loop", "focus": True}
+    draw = partial(pictures.draw_feedback_loop, parts=parts, signals=signals, **texts)
     runs(draw, ("$r$", "$e$", "$G_r$", "$v$", "$d$", "PI", "$u$", "$w$", "milling", "$F$"), ())
-    assert counts(draw, "+", "−", "inner loop") == [4, 2, 1]
+    assert counts(draw, "+", "−", "closed loop") == [4, 2, 1]
+    for rule in layouts.RULES:
+        rule(rendered(draw)[1])
+
+
+def test_a_loop_with_a_signal_too_few_is_refused():
+    _, ax = plt.subplots()
+    with pytest.raises(ValueError, match="3 parts have 6 signals: not 4"):
+        pictures.draw_feedback_loop(ax, ("outer", "inner", "plant"))
 
 
 def test_learning_goes_round_from_memory_to_plant_to_law_to_memory():

@@ -7,7 +7,6 @@ from rcbook.pictures.face_mill import draw_face_mill_setup
 from rcbook.pictures.lathe import draw_lathe_setup
 from rcbook.pictures.loops import (
     draw_angle_loop,
-    draw_cascade_loop,
     draw_feedback_loop,
     draw_learning_loop,
     draw_periodic_loop,

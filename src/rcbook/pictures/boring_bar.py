@@ -89,11 +89,11 @@ def _draw_end(sketch: Sketch) -> None:
     """Chuck, workpiece, bore and tool along the axis, the samples of a turn, and the angle."""
     wall = bored(0.0)[1] - LEVEL
     sketch.chuck(END, JAWS, TURNED + np.pi / 3)
-    sketch.line(pen.about(END, [ROD, 2.75], TURNED), THIN, linestyle=pen.CHAIN)
-    sketch.line(pen.about(END, [wall, 2.75], 0.0), THIN)
     sketch.circle(END, PIPE, STEEL)
     sketch.area(bored(np.linspace(0.0, 2 * np.pi, 361)), PLANT)
     sketch.circle(END, ROUGH, pen=THIN)
+    sketch.line(pen.about(END, [ROD, 2.75], TURNED), THIN, linestyle=pen.CHAIN)
+    sketch.line(pen.about(END, [wall, 2.75], 0.0), THIN)
     for at in bored(TURNED - 2 * np.pi * np.arange(DOTS) / DOTS):
         sketch.circle(at, 0.055, pen.INK, 0)
     tool = [(0.0, wall), (0.3, wall - 0.2), (0.3, 0.2), (0.0, 0.2)]  # cuts with its left face

@@ -25,7 +25,6 @@ def draw_regeneration(ax: Axes) -> Axes:
     """
     sketch = Sketch(ax, (0.2, 0.2, 16.4, 8.5))
     _draw_marks(sketch)
-    _draw_lengths(sketch)
     _draw_tool(sketch)
     thickness = "chip thickness\n" + r"$h(t)=h_0+x(t-\tau)-x(t)$"
     sketch.words((thickness, 10.0, 7.2, "left"), (r"cutting force $K\,h(t)$", 10.0, 6.05, "left"))
@@ -47,7 +46,7 @@ def last_surface(x: np.ndarray | float) -> np.ndarray:
 
 
 def _draw_marks(sketch: Sketch) -> None:
-    """Workpiece with both surfaces, the layer between them that is gone, and how it moves."""
+    """Workpiece, both surfaces, the layer between them that is gone, its lengths, and the feed."""
     ahead, behind = np.linspace(LEFT, TIP, 400), np.linspace(TIP, RIGHT, 600)
     old, cut, gone = (
         np.column_stack([x, surface(x)])
@@ -60,9 +59,6 @@ def _draw_marks(sketch: Sketch) -> None:
     sketch.line(cut, BOLD)
     sketch.arrow((3.4, 0.85), (5.3, 0.85))
 
-
-def _draw_lengths(sketch: Sketch) -> None:
-    """Chip thickness at the tool and on average, and the shift between the two waves."""
     tip, crest, at = cut_surface(TIP), last_surface(TIP), TIP - 1.15
     for height in (tip, crest):
         sketch.line([(at - 0.2, height), (TIP, height)], THIN)

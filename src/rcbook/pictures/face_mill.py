@@ -28,7 +28,6 @@ def draw_face_mill_setup(ax: Axes, mill: FaceMill = EIGHT_TEETH) -> Axes:
     sketch, cutter = Sketch(ax), Cutter(mill)
     _draw_blank(sketch, cutter)
     _draw_cutter(sketch, cutter)
-    _draw_angles(sketch, cutter)
     chip, end = "chip thickness\n" + r"$f_t\,\sin\theta_i+\Delta_i$", cutter.chip_ends()[1]
     words = "cutter centre,\noff by the runout"
     sketch.write(words, 7.0, 0.62, "left", cutter.centre, color=DISTURBED)
@@ -93,7 +92,7 @@ def _draw_blank(sketch: Sketch, cutter: Cutter) -> None:
 
 
 def _draw_cutter(sketch: Sketch, cutter: Cutter) -> None:
-    """Body with a pocket ahead of every insert, numbered inserts, runout, sense of rotation."""
+    """Body with a pocket ahead of every insert, inserts, runout; angles, chip, force and pitch."""
     teeth, fine = cutter.mill.teeth, np.linspace(BODY[0][0], BODY[0][-1], 60)
     turn = np.concatenate([fine + cutter.angle(n) for n in range(teeth, 0, -1)])
     sketch.area(about(cutter.centre, np.tile(PchipInterpolator(*BODY)(fine), teeth), turn), STEEL)
@@ -106,9 +105,6 @@ def _draw_cutter(sketch: Sketch, cutter: Cutter) -> None:
     sketch.runout(AXIS, cutter.centre, RADIUS)
     sketch.turn(AXIS, 3.2, -48.0, -10.0)
 
-
-def _draw_angles(sketch: Sketch, cutter: Cutter) -> None:
-    """Where a tooth enters and leaves, an insert's angle, chip and force, and the pitch."""
     (x, y), tip = AXIS, cutter.path(cutter.longest, STANDS)
     for line in ([AXIS, (x, y + 3.4)], [(x, y - RADIUS), (x, y - 3.2)], [AXIS, tip]):
         sketch.line(line, THIN)

@@ -25,8 +25,7 @@ def draw_lathe_setup(ax: Axes, half_side: float = 10e-3) -> Axes:
     """
     sketch, below = Sketch(ax), {"fill": FOCUS, "width": 2.3, "height": 1.4}
     _draw_section(sketch)
-    _draw_slide(sketch)
-    _draw_radius(sketch, 1e3 * half_side)
+    _draw_slide(sketch, 1e3 * half_side)
     items = [
         Node("chuck", (CENTRE[0], CENTRE[1] - CHUCK + 0.28)),
         Block("angle", "spindle\nencoder", (CENTRE[0], 1.45), **below),
@@ -60,14 +59,14 @@ def _draw_section(sketch: Sketch) -> None:
     sketch.arrow(CENTRE, _around(INRADIUS, np.pi), THIN, both=True)
     sketch.arrow(CENTRE, _around(polygon_section(TURNED, 4, INRADIUS), TURNED), BOLD, both=True)
     sketch.turn(CENTRE, 0.78, 90.0, 90.0 + np.degrees(TURNED), THIN)
-    sketch.circle(CENTRE, 0.07, pen.INK)
+    sketch.circle(CENTRE, 0.07, pen.INK, 0)
     x, y = CENTRE
     sketch.words((r"$y_r(\theta)$", x + 0.72, y + 0.35), (r"$\theta$", x + 1.02, y - 0.29))
     sketch.words(("$a$", x - 0.42, y + 0.58), ("workpiece", 5.75, 7.0, "left", (x + 1.3, y + 0.75)))
 
 
-def _draw_slide(sketch: Sketch) -> None:
-    """Tool with its edge on the section, slide on its way, and the screw that moves it."""
+def _draw_slide(sketch: Sketch, half_side: float) -> None:
+    """Tool on the section, slide and screw; the radius over a turn, for a half side in mm."""
     tip, (left, right) = _around(polygon_section(TURNED, 4, INRADIUS), TURNED), SLIDE
     back = left - tip[0]
     sketch.area(np.add(tip, [(0.0, 0.0), (0.22, -0.5), (back, -0.5), (back, 0.0)]), TOOL)
@@ -80,9 +79,6 @@ def _draw_slide(sketch: Sketch) -> None:
     sketch.arrow((left + 0.3, 5.9), (right - 0.3, 5.9), BOLD, both=True)
     sketch.words(("tool", 6.22, 4.2), ("slide", (left + right) / 2, SCREW), ("$y$", 6.92, 5.86))
 
-
-def _draw_radius(sketch: Sketch, half_side: float) -> None:
-    """Radius of the section over one turn, and where the spindle stands; `half_side` in mm."""
     left, right, bottom, top = GRAPH
     angle = np.append(np.linspace(0.0, 2 * np.pi, 361), TURNED)
     share = (polygon_section(angle, 4, 1.0) - 1) / (np.sqrt(2) - 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import chain
 
 from matplotlib.axes import Axes
 
@@ -20,54 +21,36 @@ def draw_feedback_loop(
     parts: Sequence[str] = ("controller", "plant"),
     signals: Sequence[str] = ("$r$", "$e$", "$u$", "$y$"),
     disturbance: str = "",
+    inner_loop: str = "",
     focus: bool = False,
 ) -> Axes:
-    """Draw a unity feedback loop from the texts of its two blocks and its four signals in order.
+    """Draw a unity feedback loop, or nested ones, from the texts of parts and signals in order.
 
-    A `disturbance` is added between controller and plant; `focus` tints the controller.
+    Every part but the last, the plant, acts on an error of its own; the outermost comes first.
+    A `disturbance` enters at the plant's input, a text for `inner_loop` frames and names the
+    innermost loop, and `focus` tints the outermost controller.
+
+    Raises ValueError unless there are twice as many signals as parts.
     """
-    (controller, plant), (reference, error, command, output) = parts, signals
-    block = Block("controller", controller, fill=FOCUS if focus else PAPER)
+    if len(signals) != 2 * len(parts):
+        raise ValueError(f"{len(parts)} parts have {2 * len(parts)} signals: not {len(signals)}")
+    line, last = [], len(parts) - 2
+    for k, part in enumerate(parts[:-1]):
+        block = Block(f"controller {k}", part, fill=FOCUS if focus and k == 0 else PAPER)
+        line += [signals[2 * k], Sum(f"error {k}"), signals[2 * k + 1], block]
     load = [Sum("load", signs=_ADD), ""] if disturbance else []
-    end = [*load, Block("plant", plant, fill=PLANT), "", Node("out"), output]
-    items, wires = row(reference, Sum("error"), error, block, command, *end)
-    wires.append(Wire("out", "error", via=-1.3))
+    line += [signals[-2], *load, Block("plant", parts[-1], fill=PLANT)]
+    outputs = (("", Node(f"out {k}")) for k in range(last, -1, -1))
+    items, wires = row(*line, *chain(*outputs), signals[-1])
+    at = {item.name: item.xy[0] for item in items}
+    wires += [Wire(f"out {k}", f"error {k}", via=-1.3 - 0.7 * (last - k)) for k in range(last)]
+    wires.append(Wire(f"out {last}", f"error {last}", inner_loop, via=-1.3))
+    if inner_loop:
+        left, right = at[f"error {last}"] - 0.6, at[f"out {last}"] + 0.22
+        items.append(Frame("inner loop", ((left + right) / 2, -0.375), right - left, 2.35))
     if disturbance:
-        wires.append(Wire((_at(items, "load"), 1.1), "load", disturbance, color=DISTURBED))
+        wires.append(Wire((at["load"], 1.1), "load", disturbance, color=DISTURBED))
     return blocks.draw_block_diagram(ax, items, wires)
-
-
-def draw_cascade_loop(
-    ax: Axes,
-    parts: Sequence[str] = ("outer", "inner", "plant"),
-    signals: Sequence[str] = ("$r$", "$e$", "$v$", r"$\epsilon$", "$u$", "$y$"),
-    disturbance: str = "$w$",
-    inner_loop: str = "inner loop",
-) -> Axes:
-    """Draw an outer controller that sets the reference of an inner loop, which is framed.
-
-    Texts are those of the three blocks and the six signals in order, of the `disturbance` at the
-    plant's input and of the inner loop.
-    """
-    (outer, inner, plant), (reference, e, v, epsilon, u, output) = parts, signals
-    items, wires = row(
-        *(reference, Sum("outer error"), e, Block("outer", outer, fill=FOCUS), v),
-        *(Sum("error"), epsilon, Block("inner", inner), u, Sum("load", signs=_ADD), ""),
-        *(Block("plant", plant, fill=PLANT), "", Node("inner out"), "", Node("out"), output),
-    )
-    left, right = _at(items, "error") - 0.6, _at(items, "inner out") + 0.22
-    items.append(Frame("inner loop", ((left + right) / 2, -0.375), right - left, 2.35))
-    wires += [
-        Wire("inner out", "error", inner_loop, via=-1.3),
-        Wire("out", "outer error", via=-2.0),
-        Wire((_at(items, "load"), 1.1), "load", disturbance, color=DISTURBED),
-    ]
-    return blocks.draw_block_diagram(ax, items, wires)
-
-
-def _at(items: Sequence[blocks.Item], name: str) -> float:
-    """Where in a row an item is."""
-    return next(item.xy[0] for item in items if item.name == name)
 
 
 def draw_learning_loop(ax: Axes, law: str = "$H$", plant: str = "$G$") -> Axes:
@@ -101,16 +84,14 @@ def draw_repetitive_generator(ax: Axes) -> Axes:
         *(Block("memory", r"$q(z)\,z^{-(N-d-\nu)}$", fill=FOCUS), "", Node("tap"), ""),
         *(Block("compensator", r"$z^{-\nu}\,C(z)$"), "$u$"),
     )
-    items.append(Block("rest", r"$z^{-(d+\nu)}$", (_at(items, "memory"), -1.5), FOCUS))
+    (middle,) = (item.xy[0] for item in items if item.name == "memory")
+    items.append(Block("rest", r"$z^{-(d+\nu)}$", (middle, -1.5), FOCUS))
     wires += [Wire("tap", "rest", via=-1.5), Wire("rest", "sum", via=-1.5)]
     return blocks.draw_block_diagram(ax, items, wires)
 
 
 def draw_spindle_drive(ax: Axes, drive: SpindleDrive = TSAO_PONG1991) -> Axes:
-    """Draw the cascade of a spindle drive, from speed command to speed, and the cut as its load.
-
-    The controllers are above, from left to right; motor and spindle are below, from right to left.
-    """
+    """Draw the cascade of a spindle drive, from speed command to speed, and the cut as its load."""
     tall, limit = {"height": 1.4}, {"title": "current limit", "icon": blocks.LIMITED}
     proportional = r"$K_{pv}+\dfrac{K_{iv}}{s}$"
     current = r"$K_u\left(K_{pi}+\dfrac{K_{ii}}{s}\right)$"
@@ -150,8 +131,7 @@ def draw_spindle_drive(ax: Axes, drive: SpindleDrive = TSAO_PONG1991) -> Axes:
 def draw_angle_loop(ax: Axes, mill: FaceMill = EIGHT_TEETH) -> Axes:
     """Draw the repetitive loop that samples at equal steps of the cutter's turn.
 
-    Above is the controller `L_n F z^-N C / (1 - F z^-N)`, from left to right; below, from right to
-    left, is what turns with the cutter.
+    Above is the controller `L_n F z^-N C / (1 - F z^-N)`, below is what turns with the cutter.
     """
     step, size = f"{360 / mill.samples_per_turn:g}°", {"width": 2.0, "height": 1.5}
     items = [
@@ -184,8 +164,7 @@ def draw_angle_loop(ax: Axes, mill: FaceMill = EIGHT_TEETH) -> Axes:
 def draw_periodic_loop(ax: Axes) -> Axes:
     """Draw the repetitive loop whose hold and sampler act at equal steps of the spindle's turn.
 
-    Above, from left to right, is the controller, which repeats every N samples; below, from right
-    to left, the plant in continuous time.
+    Above is the controller, which repeats every N samples, below the plant in continuous time.
     """
     size = {"width": 2.0, "height": 1.4}
     items = [

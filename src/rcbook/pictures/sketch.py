@@ -48,7 +48,7 @@ class Sketch:
     The axes show a `box` (left, bottom, right, top); `em` is the font size.
     """
 
-    def __init__(self, ax: Axes, box: ArrayLike = (0.0, 0.0, 16.0, 8.4), em: float = 0.39) -> None:
+    def __init__(self, ax: Axes, box: ArrayLike = (0, 0, 16, 8.4), em: float = 1.08 * EM) -> None:
         low, high = np.reshape(box, (2, 2))
         ax.set_axis_off()
         ax.set_aspect("equal")
@@ -77,7 +77,9 @@ class Sketch:
         corners = np.multiply([(0, 0), (0, 1), (1, 1), (1, 0)], (width, height))
         return self.area(np.add(corners, (left, bottom)), *ink, **style)
 
-    def circle(self, centre: Point, radius: float, fill: str = PAPER, pen: float = LINE, **style):
+    def circle(
+        self, centre: Point, radius: float, fill: str = PAPER, pen: float = LINE, **style
+    ) -> None:
         """A filled circle; `style` is Matplotlib's."""
         ink = {"facecolor": fill, "edgecolor": INK, "linewidth": pen, "zorder": 2}
         self.ax.add_patch(Circle(tuple(centre), radius, **{**ink, **style}))
@@ -98,7 +100,9 @@ class Sketch:
         if both:
             self.head(start, -step, scale)
 
-    def turn(self, centre: Point, radius: float, start: float, end: float, pen: float = BOLD):
+    def turn(
+        self, centre: Point, radius: float, start: float, end: float, pen: float = BOLD
+    ) -> None:
         """An arc from one angle (degrees clockwise from the top) to another, with a head."""
         scale, (start, end) = {THIN: 0.8, BOLD: 1.2}[pen], np.radians([start, end])
         back = np.sign(end - start) * scale * HEAD / radius  # the angle that the head takes
@@ -106,7 +110,9 @@ class Sketch:
         step = about((0, 0), np.sign(back), end - back / 2 + np.pi / 2)
         self.head(about(centre, radius, end), step, scale)
 
-    def write(self, text: str, x: float, y: float, ha: str = "center", to: Point = (), **style):
+    def write(
+        self, text: str, x: float, y: float, ha: str = "center", to: Point = (), **style
+    ) -> None:
         """Words at a point, and a thin line from them to what they name, where `to` is given."""
         style = {"va": "center", "color": INK, "fontsize": self.font, "zorder": 3, **style}
         if len(to):
