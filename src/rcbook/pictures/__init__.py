@@ -1,4 +1,8 @@
-"""Pictures of the book: block diagrams, machines and results, each drawn on a given axes."""
+"""Pictures of the book: block diagrams, machines and results, each drawn on a given axes.
+
+A new machine gets a module of its own here.  Its `draw_` functions need nothing but axes, have the
+machine's parameters as defaults and return the axes; the tests find them and apply their rules.
+"""
 
 from rcbook.pictures.blocks import Block, Frame, Node, Sum, Wire, draw_block_diagram, path, row
 from rcbook.pictures.boring_bar import draw_boring_setup, draw_periodic_sampling
