@@ -184,6 +184,34 @@ def test_an_identity_and_what_cannot_be_computed_need_no_change():
     assert not falsify.unflipped(replace(here, claims=claims), [])
 
 
+def test_what_is_wrong_without_a_change_is_no_flip():
+    here = named(paper(grow=GROW), area="grow", mad="grow", safe="grow")
+    ids = list(here.claims)
+    plain = Trial("", None, dict.fromkeys(ids, "not reproduced"), {}, ())
+    grown = Trial("grow", 0.04, dict.fromkeys(ids, "not reproduced"), {}, ())
+    assert len(falsify.unflipped(here, [plain, grown])) == 3
+
+
+def test_an_old_value_is_no_result_of_a_statement_that_failed(folder):
+    path = folder / "one.ipynb"
+    notebook = nbformat.read(path, as_version=4)
+    notebook.cells[0].source = (
+        "import math\nfrom fake import ledger\nx = 3.0\nx = math.tau / 2\n"
+        'ledger.check("fake.area", x)'
+    )
+    nbformat.write(notebook, path)
+    lost = paper(lost={"what": "w", "apply": "import math\ndel math.tau"})
+    (trial,) = falsify.trials(lost, folder, [("lost", None)])
+    assert not trial.verdicts and len(trial.troubles) == 2
+
+
+@pytest.mark.parametrize("apply", ["raise SystemExit(0)", "import os; os._exit(0)"])
+def test_a_change_that_ends_the_program_is_refused(folder, apply):
+    ends = paper(ends={"what": "w", "apply": apply})
+    with pytest.raises(ValueError, match=r"'ends' of fake does not run"):
+        falsify.trials(ends, folder, [("ends", None)])
+
+
 def test_an_unknown_change_and_one_that_does_not_run_are_refused(folder):
     with pytest.raises(ValueError, match=r"no change shrink"):
         falsify.trials(paper(), folder, [("shrink", None)])

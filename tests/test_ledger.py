@@ -242,6 +242,7 @@ def test_evidence_becomes_plain_python():
 # ---- data files ----
 
 GOOD = """
+key = "paper"
 title = "A title"
 citation = "A. Author, A Paper"
 notebook = "paper.ipynb"
@@ -373,6 +374,18 @@ def test_a_malformed_file_is_a_value_error_naming_the_claim_or_file(folder, old,
     ("old", "new", "message"),
     [
         ('why = "a slip"\n', "", r"paper\.toml, \[errata\.eq25\]: lacks why; add it"),
+        ('key = "paper"', 'key = "other"', "its key is 'other'; make it 'paper'"),
+        ("chapter = 1", 'chapter = "1"', r"paper\.toml: chapter = '1' is no int"),
+        ("chapter = 1", "chapter = true", "chapter = True is no int"),
+        ('title = "A title"', "title = 3", "title = 3 is no str"),
+        ('notebook = "paper.ipynb"', 'notebook = "../a.ipynb"', "give the name of a notebook"),
+        ('unit = ""', "unit = 3", r"paper\.toml, paper\.a: unit = 3; give a text in quotes"),
+        ("sizes = [0.01, 0.1]", "sizes = [true]", "give one or more above 0"),
+        ("sizes = [0.01, 0.1]", 'sizes = "x"', "give one or more above 0"),
+        ('apply = "pass"', 'apply = "import rcbook.ledger"', "it reaches for the verdicts"),
+        ('key = "paper"', 'key = "paper"\nkey = "paper"', r"paper\.toml: .*mend it there"),
+        ("{value:.2f} s", "{value.real} s", "is no name of a piece of evidence"),
+        ("{value:.2f} s", "{0} s", "is no name of a piece of evidence"),
         ('why = "a slip"', 'because = "a slip"\nwhy = ""', r"\[errata\.eq25\]: unknown because"),
         ('cite = "horng1989"\n', "", r"paper\.toml, \[idea\]: lacks cite"),
         (

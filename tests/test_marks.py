@@ -109,6 +109,62 @@ def test_a_mark_that_says_nothing_is_refused(text, message):
 
 
 @pytest.mark.parametrize(
+    ("text", "number"),
+    [
+        (r"$F\approx88.4$", "88.4"),  # glued to a command of TeX
+        (r"$|GH|\le99.5$", "99.5"),
+        (r"$4\cdot10^{8}$", r"4\cdot10^{8}"),
+        ("For $k<N$ it is 66.6 lb, and $k>N$.", "66.6"),  # no tag
+        ("f<a, 99.4 lb>", "99.4"),
+        ("```{note}\nThe peak is 99 lb.\n```", "99"),
+        ("{math}`F = 99.5`", "99.5"),
+        ('![a](x.png "peak 99 lb")', "99"),
+        ("a force of 2012 lb", "2012"),  # no year
+        ("equals 1995", "1995"),
+        ("## 99 lb is the peak", "99"),
+        ("a gain of .05", ".05"),
+        ("it passes 99 Hz", "99"),
+        ("case 2, 30 lb", "30"),
+        ("no 40 percent", "40"),
+        ("by a step 88 wide", "88"),
+    ],
+)
+def test_a_number_does_not_hide(text, number):
+    assert (number, marks.UNACCOUNTED) in kinds(text)
+
+
+def test_a_mark_in_a_table_means_its_row_only():
+    text = "| a | b |\n|---|---|\n| 5 | 6 |\n| 7 | 8<!-- paper: table 1 --> |"
+    assert [kind for _, kind in kinds(text)] == [marks.UNACCOUNTED] * 2 + [marks.QUOTED] * 2
+
+
+def test_a_quotation_has_the_digits_of_the_print():
+    printed = {"paper.a": "0.219"}.__getitem__
+    assert kinds("0.21900<!-- claim: paper.a -->", printed=printed)[0][1] == marks.UNACCOUNTED
+
+
+@pytest.mark.parametrize(
+    "mark",
+    [
+        "{77.7:.1f}",  # checks itself
+        "{'88.4':s}",
+        '{ledger.check("paper.a", 1).computed:.1f}',  # changes the run
+        "{(x := 2):.0f}",
+        "{x.__class__:.0f}",
+        "{x +:.0f}",
+    ],
+)
+def test_a_mark_reads_a_number_of_the_run_and_does_nothing_else(mark):
+    with pytest.raises(ValueError):
+        marks.numbers(f"88.4<!-- {mark} -->")
+
+
+def test_where_nothing_runs_no_mark_is_computed():
+    with pytest.raises(ValueError, match="nothing runs this text"):
+        marks.numbers("88.4<!-- {x:.1f} -->", runs=False)
+
+
+@pytest.mark.parametrize(
     ("typed", "computed", "same"),
     [
         ("0.50", "0.50", True),
@@ -130,6 +186,8 @@ def test_typed_and_computed_are_compared_digit_by_digit(typed, computed, same):
 
 
 def test_rewriting_keeps_the_way_of_writing():
+    dotted = r"$4\cdot10^{8}$<!-- {b:.0e} -->"
+    assert marks.rewritten(dotted, {1: "5e+08"}) == r"$5\cdot10^{8}$<!-- {b:.0e} -->"
     text = r"From −3.1 over $4\times10^{8}$<!-- {a:.1f} {b:.0e} --> on."
     values = {text.index("−"): "-2.9", text.index("4"): "5e+07"}
     assert marks.rewritten(text, values) == (
@@ -189,6 +247,17 @@ def test_a_wrong_number_in_an_alternative_text_fails_too(make):
 def test_an_expression_that_fails_is_a_failure_that_says_why(make):
     _, _, failures, _ = executed(make, "3<!-- {nowhere:.0f} --> and 2<!-- {x / 0:.0f} -->.")
     assert "NameError" in failures[0].what and "ZeroDivisionError" in failures[1].what
+
+
+def test_a_notebook_may_call_anything_format(make):
+    cells = ("x = 9.9", "format = lambda value, spec: '2.0'", LEDGER, COVER)
+    _, _, failures, _ = executed(make, "It is 2.0<!-- {x:.1f} -->.", cells=cells)
+    assert len(failures) == 1
+
+
+def test_what_is_no_number_is_not_typed(make):
+    project, _, failures, typed = executed(make, "It is 2.1<!-- {float('nan') * x:.1f} -->.")
+    assert len(failures) == 1 and numbers.rewrite(project, typed) == 0
 
 
 def test_one_command_rewrites_the_numbers(make):

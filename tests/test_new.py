@@ -57,9 +57,35 @@ def test_nothing_is_overwritten_and_a_bad_key_is_refused(clone):
     with pytest.raises(ValueError, match="exists already"):
         new.create(project, "smith2001")
     assert (clone / "book" / "_toc.yml").read_text(encoding="utf-8") == before
-    for key in ("Smith", "2001smith", "smith-2001", ""):
+    for key in ("Smith", "2001smith", "smith-2001", "", "class", "numbers"):
         with pytest.raises(ValueError, match="is no key"):
             new.create(project, key)
+
+
+def test_a_title_that_would_break_the_data_file_is_refused(clone):
+    for title in ('A "quoted" one', "two\nlines", "a \\ slash"):
+        with pytest.raises(ValueError, match="leave them out"):
+            new.create(find(clone), "smith2001", title)
+    assert not (clone / "notebooks" / "smith2001.ipynb").exists()
+
+
+def test_an_interrupt_half_way_leaves_nothing(clone, monkeypatch):
+    project, written = find(clone), []
+
+    def stopped(path, text):
+        if len(written) == 3:
+            written.append(path)
+            raise KeyboardInterrupt
+        written.append(path)
+        write(path, text)
+
+    write = new.write
+    contents = (clone / "book" / "_toc.yml").read_text(encoding="utf-8")
+    monkeypatch.setattr(new, "write", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        new.create(project, "smith2001")
+    assert len(written) > 3 and not list(clone.rglob("*smith2001*"))
+    assert (clone / "book" / "_toc.yml").read_text(encoding="utf-8") == contents
 
 
 def test_the_new_chapter_stands_after_the_last_one(clone):

@@ -73,7 +73,23 @@ def test_nothing_is_executed_when_something_is_wrong(sound):
     assert not sound.ledger_file.exists()
 
 
-def test_a_file_that_is_no_notebook_is_left_to_the_execution(sound):
-    nbformat.write(nbformat.v4.new_notebook(), sound.notebooks / "two.ipynb")
-    (sound.notebooks / "three.ipynb").write_text("{", encoding="utf-8")
-    assert not [p for p in preflight.problems(sound) if "three" in p]
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"cells": []}', "\ufeff{}"])
+def test_a_file_that_is_no_notebook_is_named_once(sound, text):
+    (sound.notebooks / "three.ipynb").write_text(text, encoding="utf-8")
+    (problem,) = preflight.problems(sound)
+    assert "three.ipynb is not a notebook" in problem
+
+
+@pytest.mark.parametrize("text", ["", "- a list", "parts: 3", "parts: [", "root: index"])
+def test_contents_that_cannot_be_read_are_named(sound, text):
+    (sound.book / "_toc.yml").write_text(text, encoding="utf-8")
+    (problem,) = preflight.problems(sound)
+    assert problem == "_toc.yml: no list of parts with chapters; restore it"
+
+
+@pytest.mark.parametrize("settings", ["x", {"image": []}, {"image": {"alt": 5}}])
+def test_odd_metadata_of_a_cell_are_no_alternative_text(sound, settings):
+    notebook = nbformat.read(sound.notebooks / "one.ipynb", as_version=4)
+    notebook.cells[-1].metadata["mystnb"] = settings
+    nbformat.write(notebook, sound.notebooks / "one.ipynb")
+    assert not preflight.problems(sound)

@@ -26,14 +26,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         return arguments.run(arguments)
     except KeyboardInterrupt:
-        print("interrupted; nothing was changed", file=sys.stderr)
+        print("interrupted", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:  # `rcbook ledger | head`
         sys.stderr.close()
         return OK
     except ModuleNotFoundError as error:
         print(f"rcbook: {error.name} is missing; pip install 'rcbook[book]'", file=sys.stderr)
-    except ValueError as error:
+    except (ValueError, OSError) as error:
         print(f"rcbook: {error}", file=sys.stderr)
     return FAILED
 
@@ -127,7 +127,7 @@ def _falsify(arguments: argparse.Namespace) -> int:
         print("".join(f"UNFLIPPED {problem}\n" for problem in lacking), end="")
         problems += len(lacking)
         shown += sum(claim.role in ledger.SCORED for claim in paper.claims.values())
-        if arguments.measure:
+        if arguments.measure and not lacking:
             falsify.store(paper, falsify.margins(paper, tried))
     print(f"{shown} scored claims, {problems} not shown to be falsifiable")
     return FAILED if problems else OK
@@ -141,11 +141,15 @@ def _numbers(arguments: argparse.Namespace) -> int:
     project = find(Path.cwd())
     if arguments.rewrite:
         paths = sorted(project.notebooks.glob(arguments.file or "*.ipynb"))
+        if not paths:
+            raise ValueError(f"no notebook {arguments.file!r} in {project.notebooks}; name one")
         _, failures, typed = execute.execute(paths)
         for failure in failures:
             print(f"{failure.notebook}, {failure.cell}: {run.plain(failure.what)}")
         print(f"{numbers.rewrite(project, typed)} numbers rewritten")
     places = [p for p in numbers.survey(project) if arguments.file in (None, p.file)]
+    if not places and arguments.file:
+        raise ValueError(f"no text of the book is called {arguments.file!r}; name a file of it")
     lost = [place for place in places if place.number.kind == marks.UNACCOUNTED]
     print("".join(f"UNACCOUNTED {place}\n" for place in lost), end="")
     print(numbers.table(places))

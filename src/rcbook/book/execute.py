@@ -7,6 +7,7 @@ import os
 import sys
 import tempfile
 import time
+import warnings
 from ast import literal_eval
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -79,6 +80,10 @@ class _Track:
         return Failure(self.name, what, where, self.source, detail)
 
 
+class _Unanswered(Exception):
+    """The kernel did not say what the numbers of a text are."""
+
+
 class _Stopped(Exception):
     """A cell ended without an error and is a failure all the same."""
 
@@ -112,9 +117,25 @@ def _mistyped(name: str, number: Typed) -> Failure:
 def read(path: Path) -> nbformat.NotebookNode:
     """The notebook in `path`.  Raises ValueError when it is none."""
     try:
-        return nbformat.read(path, as_version=4)
-    except (nbformat.reader.NotJSONError, nbformat.ValidationError, AttributeError) as error:
-        raise ValueError(f"{path} is not a notebook: {str(error).splitlines()[0]}") from None
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # such as cells without ids
+            notebook = nbformat.read(path, as_version=4)
+            nbformat.validate(notebook)
+    except (
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        Warning,
+        nbformat.ValidationError,
+    ) as e:
+        first = (str(e) or type(e).__name__).splitlines()[0]
+        raise ValueError(f"{path} is not a notebook: {first}; mend it in Jupyter") from None
+    if not notebook.cells:
+        raise ValueError(f"{path} is not a notebook: it has no cells")
+    if not all("id" in cell for cell in notebook.cells):
+        raise ValueError(f"{path} is not a notebook of format 4.5: its cells have no ids")
+    return notebook
 
 
 def kernel_environment(scratch: Path) -> dict[str, str]:
@@ -139,6 +160,7 @@ def kernel_environment(scratch: Path) -> dict[str, str]:
 async def _execute_all(notebooks: Mapping, limit: float, environment: Mapping) -> list:
     # More than there are processors, so that a long notebook at the end does not run by itself.
     slots = asyncio.Semaphore(2 * (os.cpu_count() or 1))
+    asyncio.get_running_loop().set_exception_handler(_quiet_at_the_end)
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[cell]}"))
     with Progress(*columns, TimeElapsedColumn(), disable=not sys.stdout.isatty()) as progress:
 
@@ -147,6 +169,12 @@ async def _execute_all(notebooks: Mapping, limit: float, environment: Mapping) -
                 return await _execute_one(path, notebook, limit, environment, progress)
 
         return await asyncio.gather(*(one(*item) for item in notebooks.items()))
+
+
+def _quiet_at_the_end(loop: asyncio.AbstractEventLoop, context: dict) -> None:
+    """After Ctrl-C a kernel may die before its task is told; that is no news."""
+    if "shutdown" not in context["message"]:
+        loop.default_exception_handler(context)
 
 
 async def _execute_one(
@@ -239,7 +267,15 @@ def to_check(cell: nbformat.NotebookNode) -> list[tuple[str, bool, marks.Number]
 
 def alternative(cell: nbformat.NotebookNode) -> str:
     """The alternative text of a cell that draws, or nothing."""
-    return cell.metadata.get("mystnb", {}).get("image", {}).get("alt", "")
+    image = figure(cell, "image")
+    return image["alt"] if isinstance(image.get("alt"), str) else ""
+
+
+def figure(cell: nbformat.NotebookNode, part: str = "figure") -> Mapping:
+    """What the metadata of a cell say of its picture, as the renderer reads them."""
+    settings = cell.metadata.get("mystnb", {})
+    found = settings.get(part, {}) if isinstance(settings, Mapping) else {}
+    return found if isinstance(found, Mapping) else {}
 
 
 async def _type(kernel, wanted: Sequence, track: _Track, last: bool) -> list:
@@ -249,9 +285,14 @@ async def _type(kernel, wanted: Sequence, track: _Track, last: bool) -> list:
     """
     if not wanted:
         return []
-    asked = {str(i): f"format({n.expression}, {n.spec!r})" for i, (*_, n) in enumerate(wanted)}
+    form = "__import__('builtins').format"  # whatever the notebook calls `format`
+    asked = {str(i): f"{form}({n.expression}, {n.spec!r})" for i, (*_, n) in enumerate(wanted)}
     settings = {"silent": True, "store_history": False, "user_expressions": asked}
-    reply = await ensure_async(kernel.execute("", reply=True, timeout=60, **settings))
+    try:
+        reply = await ensure_async(kernel.execute("", reply=True, timeout=60, **settings))
+    except (TimeoutError, RuntimeError) as error:
+        named = ", ".join(f"{cell}: {{{n.expression}}}" for cell, _, n in wanted)
+        raise _Unanswered(f"the numbers of the text are not answered ({named}): {error}") from None
     waiting = []
     for i, (cell, alt, number) in enumerate(wanted):
         result = reply["content"]["user_expressions"][str(i)]

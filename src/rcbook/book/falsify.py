@@ -68,7 +68,15 @@ def _trial(paper: Paper, notebooks: Path, name: str, size: float | None) -> Tria
 
     code = paper.changes[name]["apply"] if name else ""
     with tempfile.TemporaryDirectory(prefix="rcbook-", ignore_cleanup_errors=True) as scratch:
-        job = json.dumps({"notebook": str(notebooks / paper.notebook), "apply": code, "size": size})
+        answer = Path(scratch) / "answer.json"  # a change may print what it likes
+        job = json.dumps(
+            {
+                "notebook": str(notebooks / paper.notebook),
+                "apply": code,
+                "size": size,
+                "answer": str(answer),
+            }
+        )
         settings = {
             "cwd": notebooks,
             "env": kernel_environment(Path(scratch)) | {"MPLBACKEND": "agg"},
@@ -82,9 +90,10 @@ def _trial(paper: Paper, notebooks: Path, name: str, size: float | None) -> Tria
             raise ValueError(
                 f"change {name!r} of {paper.key} still runs after {LIMIT:g} s; make it smaller"
             ) from None
-    if done.returncode:
-        raise ValueError(f"change {name!r} of {paper.key} does not run:\n{done.stderr[-3000:]}")
-    return Trial(name, size, **json.loads(done.stdout.splitlines()[-1]))
+        if done.returncode or not answer.is_file():
+            why = done.stderr.strip().splitlines()[-1:] or ["it ended without an answer"]
+            raise ValueError(f"change {name!r} of {paper.key} does not run: {why[0]}")
+        return Trial(name, size, **json.loads(answer.read_text(encoding="utf-8")))
 
 
 def run_cells(notebook: Path, apply: str, size: float | None) -> dict:
@@ -104,8 +113,9 @@ def run_cells(notebook: Path, apply: str, size: float | None) -> dict:
         for statement in ast.parse(cell.source).body:
             try:
                 exec(compile(ast.Module([statement], []), cell.id, "exec"), space)
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 troubles.append(f"{cell.id}: {type(error).__name__}: {error}")
+                _forget(statement, space)
         plt.close("all")
     judged = {}
     for item in space.values():
@@ -116,6 +126,14 @@ def run_cells(notebook: Path, apply: str, size: float | None) -> dict:
         "computed": {row["id"]: row["computed"] for row in _rows(space)},
         "troubles": troubles,
     }
+
+
+def _forget(statement: ast.stmt, space: dict) -> None:
+    """Take away what a statement that failed would have bound: an old value is no result."""
+    for node in ast.walk(statement):
+        bound = isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+        if bound and not isinstance(space.get(node.id), Ledger):
+            space.pop(node.id, None)
 
 
 def listing(paper: Paper, tried: Sequence[Trial]) -> str:
@@ -142,10 +160,16 @@ def _rows(space: Mapping) -> Iterable[Mapping]:
 def unflipped(paper: Paper, tried: Sequence[Trial]) -> list[str]:
     """Why the scored claims of `paper` are not all shown to be falsifiable; empty when they are.
 
-    A claim is, when the change it names turns its verdict at the largest size tried.
+    A claim is, when the change it names turns its verdict at the largest size tried.  Without a
+    change, where that was tried, every verdict is the expected one.
     """
     largest = {trial.change: trial for trial in sorted(tried, key=lambda t: t.size or 0.0)}
     problems = []
+    if plain := largest.get(""):
+        problems += [f"{trouble} (without a change)" for trouble in plain.troubles]
+        for id, verdict in plain.verdicts.items():
+            if verdict != paper.claims[id].expected:
+                problems.append(f"{id}: {verdict} without a change; expected otherwise")
     for claim in paper.claims.values():
         if claim.role not in ledger.SCORED or claim.expected == ledger.NOT_COMPUTABLE:
             continue
@@ -226,6 +250,5 @@ def store(paper: Paper, found: Mapping[str, Mapping]) -> Path:
 
 if __name__ == "__main__":
     job = json.load(sys.stdin)
-    out, sys.stdout = sys.stdout, sys.stderr  # notebooks may print; the answer stands alone
-    answer = run_cells(Path(job["notebook"]), job["apply"], job["size"])
-    print(json.dumps(answer), file=out)
+    said = run_cells(Path(job["notebook"]), job["apply"], job["size"])
+    Path(job["answer"]).write_text(json.dumps(said), encoding="utf-8")

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import keyword
 import re
+import sys
 from importlib import resources
 from pathlib import Path
 
@@ -15,11 +18,12 @@ def create(project: Project, key: str, title: str = "") -> list[Path]:
     """Write the skeletons of paper `key`, and its lines in contents and bibliography.
 
     Returns the files written and changed.  Nothing that exists is overwritten.
-    Raises ValueError for a key that is no name in lower case or that is taken, and for a checkout
-    whose contents have no chapter.
+    Raises ValueError for a key that is no name in lower case, that Python has for itself or that is
+    taken, for a title with quotes or breaks, and for a checkout whose contents have no chapter.
     """
-    if not re.fullmatch(r"[a-z][a-z0-9_]*", key):
-        raise ValueError(f"{key!r} is no key; use lower case, digits and _, such as smith2001")
+    taken = keyword.iskeyword(key) or key in sys.stdlib_module_names
+    if taken or not re.fullmatch(r"[a-z][a-z0-9_]*", key):
+        raise ValueError(f"{key!r} is no key; use author and year, such as smith2001")
     package = project.root / "src" / "rcbook"
     files = {
         package / "papers" / f"{key}.toml": "paper.toml",
@@ -32,16 +36,29 @@ def create(project: Project, key: str, title: str = "") -> list[Path]:
     contents, bibliography = project.book / "_toc.yml", project.book / "references.bib"
     listed = _listed(contents.read_text(encoding="utf-8"), key)
     entry = f"\n@misc{{{key},\n  author = {{Author, A.}},\n  title  = {{Title}},\n}}\n"
+    title = title or f"{key}: what it is about"
+    if title != json.dumps(title, ensure_ascii=False)[1:-1]:
+        raise ValueError(f"the title {title!r} holds quotes or breaks; leave them out")
     values = {
         "@KEY@": key,
-        "@TITLE@": title or f"{key}: what it is about",
+        "@TITLE@": title,
         "@CHAPTER@": str(max(paper.chapter for paper in project.papers) + 1),
     }
-    for path, name in files.items():
-        write(path, _filled(name, values))
-    write(contents, listed)
-    write(bibliography, bibliography.read_text(encoding="utf-8").rstrip("\n") + "\n" + entry)
-    return [*files, contents, bibliography]
+    texts = {path: _filled(name, values) for path, name in files.items()}
+    texts[contents] = listed
+    texts[bibliography] = bibliography.read_text(encoding="utf-8").rstrip("\n") + "\n" + entry
+    before = {path: path.read_text(encoding="utf-8") for path in texts if path.exists()}
+    try:
+        for path, text in texts.items():
+            write(path, text)
+    except BaseException:  # also Ctrl-C: all or nothing
+        for path in texts:
+            if path in before:
+                write(path, before[path])
+            else:
+                path.unlink(missing_ok=True)
+        raise
+    return list(texts)
 
 
 def _listed(contents: str, key: str) -> str:

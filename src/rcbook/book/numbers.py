@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-import nbformat
-
 from rcbook import ledger
-from rcbook.book.execute import alternative
+from rcbook.book.execute import alternative, figure, read
 from rcbook.book.project import Project, write
 from rcbook.ledger import marks, words
 
@@ -40,28 +39,32 @@ def survey(project: Project) -> list[Place]:
 
 def of_texts(project: Project) -> list[Place]:
     """Every number in the notebooks and pages.  Raises ValueError as `survey` does."""
-    printed = {claim.id: claim.printed for p in project.papers for claim in p.claims.values()}
+    printed = _printed(project)
     found: list[Place] = []
     for path in sorted(project.notebooks.glob("*.ipynb")):
-        found += _read(path.name, _cells(path), lambda text: marks.numbers(text, _of(printed)))
+        found += _read(path.name, _cells(path), partial(marks.numbers, printed=printed))
     for path in sorted(project.book.glob("*.md")):
         text = path.read_text(encoding="utf-8")
-        found += _read(path.name, [("text", text)], marks.numbers)
+        page = partial(marks.numbers, printed=printed, runs=False)
+        found += _read(path.name, [("text", text)], page)
     return found
 
 
 def of_data(project: Project) -> list[Place]:
     """Every number in the data files.  Raises ValueError as `survey` does."""
+    printed = _printed(project)
     found: list[Place] = []
     for paper in project.papers:
         for at, text, quoted in _texts(paper.key):
-            found += _read(
-                f"{paper.key}.toml", [(at, text)], lambda t, q=quoted: marks.of_template(t, q)
-            )
-    return found + _read("words.toml", _words(), marks.numbers)
+            template = partial(marks.of_template, quoted=quoted, printed=printed)
+            found += _read(f"{paper.key}.toml", [(at, text)], template)
+    return found + _read("words.toml", _words(), partial(marks.numbers, runs=False))
 
 
-def _of(printed: Mapping[str, str]) -> Callable[[str], str]:
+def _printed(project: Project) -> Callable[[str], str]:
+    """What a claim prints, by its id."""
+    printed = {claim.id: claim.printed for p in project.papers for claim in p.claims.values()}
+
     def look_up(id: str) -> str:
         if id not in printed:
             raise ValueError(f"<!-- claim: {id} --> names no claim of any paper")
@@ -84,12 +87,10 @@ def _read(file: str, texts: Iterable[tuple[str, str]], numbers: Callable) -> lis
 
 
 def _cells(path: Path) -> Iterable[tuple[str, str]]:
-    try:
-        cells = nbformat.read(path, as_version=4).cells
-    except (nbformat.reader.NotJSONError, nbformat.ValidationError, AttributeError):
-        cells = []  # execution says why it is no notebook
-    for cell in cells:
-        if cell.cell_type == "markdown":
+    for cell in read(path).cells:
+        if caption := figure(cell).get("caption"):
+            yield f"{cell.id} (caption)", caption
+        if cell.cell_type in ("markdown", "raw"):
             yield cell.id, cell.source
         elif text := alternative(cell):
             yield f"{cell.id} (alternative text)", text
@@ -99,7 +100,7 @@ def _texts(key: str) -> Iterable[tuple[str, str, Sequence[str]]]:
     """The texts of a paper's data file that are ours, each with what it may quote unmarked."""
     data = ledger.source(key)
     for claim in data["claims"]:
-        fields = ("says", "printed", "mended", "where", "unit")
+        fields = ("says", "printed", "mended", "unit")
         quoted = [claim.get(name, "") for name in fields]
         for name in ("reason", "tolerance_reason", "lost"):
             yield f"{claim['id']} {name}", claim.get(name, ""), quoted
@@ -127,11 +128,11 @@ def _words() -> Iterable[tuple[str, str]]:
 def rewrite(project: Project, typed: Mapping[str, Sequence]) -> int:
     """Put what a run computed into the notebooks; how many numbers changed.
 
-    A number whose expression failed stays as it is.
+    A number whose expression failed, or gave no finite number, stays as it is.
     """
-    changed = 0
+    changed, texts = 0, {}
     for name, numbers in typed.items():
-        wrong = [n for n in numbers if n.computed and not n.right]
+        wrong = [n for n in numbers if marks.is_number(n.computed) and not n.right]
         if not wrong:
             continue
         path = project.notebooks / name
@@ -140,8 +141,10 @@ def rewrite(project: Project, typed: Mapping[str, Sequence]) -> int:
             for alt in (False, True):
                 here = (cell["id"], alt)
                 _put(cell, alt, {n.start: n.computed for n in wrong if (n.cell, n.alt) == here})
-        write(path, json.dumps(notebook, indent=1, ensure_ascii=False) + "\n")
+        texts[path] = json.dumps(notebook, indent=1, ensure_ascii=False) + "\n"
         changed += len(wrong)
+    for path, text in texts.items():
+        write(path, text)
     return changed
 
 

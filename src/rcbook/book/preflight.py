@@ -10,6 +10,7 @@ import nbformat
 import yaml
 
 from rcbook.book import numbers
+from rcbook.book.execute import read
 from rcbook.book.project import Project
 from rcbook.ledger import Paper
 
@@ -46,16 +47,20 @@ def _of_paper(project: Project, paper: Paper) -> Iterable[str]:
 
 def _cells(path: Path) -> list[nbformat.NotebookNode]:
     try:
-        return nbformat.read(path, as_version=4).cells
-    except (nbformat.reader.NotJSONError, nbformat.ValidationError, AttributeError):
-        return []  # execution says why
+        return read(path).cells
+    except ValueError:
+        return []  # the survey of its numbers says why
 
 
 def _contents(project: Project) -> Iterable[str]:
     """Notebooks without a line in the table of contents, and lines without a file."""
     text = (project.book / "_toc.yml").read_text(encoding="utf-8")
-    parts = yaml.safe_load(text).get("parts", ())
-    chapters = [chapter for part in parts for chapter in part.get("chapters", ())]
+    try:
+        parts = yaml.safe_load(text)["parts"]
+        chapters = [chapter for part in parts for chapter in part["chapters"]]
+    except (yaml.YAMLError, KeyError, TypeError):
+        yield "_toc.yml: no list of parts with chapters; restore it"
+        return
     listed = {chapter["file"] for chapter in chapters if "file" in chapter}
     globbed = any("glob" in chapter for chapter in chapters)
     there = {f"notebooks/{path.stem}" for path in project.notebooks.glob("*.ipynb")}

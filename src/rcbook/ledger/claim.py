@@ -119,7 +119,7 @@ def parse(claim: Claim) -> Printed:
     if claim.kind in ("number", "list"):
         numbers = tuple(printed.split(";"))
         alone = claim.kind == "list" or len(numbers) == 1
-        if alone and all(re.fullmatch(_NUMBER, number) for number in numbers):
+        if alone and all(re.fullmatch(_NUMBER, number, re.ASCII) for number in numbers):
             return Printed(numbers, "equal")
     elif claim.kind == "bound":
         for relation, pattern in _BOUNDS.items():

@@ -121,7 +121,11 @@ def judge(claim: Claim, value: object = None, corrected: object = None, **eviden
     known |= {} if corrected is None else {"corrected": corrected}
     if absent := quotes(claim.reason) - known.keys():
         raise ValueError(f"{claim.id}: its reason quotes {sorted(absent)}; pass them as evidence")
-    return Judgement(claim, computed, verdict, claim.reason.format(**known), evidence)
+    try:
+        reason = claim.reason.format(**known)
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{claim.id}: its reason cannot be filled in: {error}") from None
+    return Judgement(claim, computed, verdict, reason, evidence)
 
 
 def _plain(claim: Claim, item: object) -> object:

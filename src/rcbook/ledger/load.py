@@ -29,8 +29,9 @@ def papers() -> tuple[str, ...]:
     """Keys of all papers in the package, in the order of their chapters."""
     files = resources.files("rcbook").joinpath("papers").iterdir()
     found = {f.name.removesuffix(".toml"): f for f in files if f.name.endswith(".toml")}
-    chapters = {key: tomllib.loads(f.read_text(encoding="utf-8")) for key, f in found.items()}
-    return tuple(sorted(found, key=lambda key: (chapters[key].get("chapter", 0), key)))
+    places = {key: _parsed(f).get("chapter") for key, f in found.items()}
+    known = {key: place if isinstance(place, int) else 0 for key, place in places.items()}
+    return tuple(sorted(found, key=lambda key: (known[key], key)))
 
 
 def load(key: str) -> Paper:
@@ -41,11 +42,14 @@ def load(key: str) -> Paper:
     reason quotes nothing computed.
     """
     data = source(key)
+    if data.get("key") != key:
+        raise ValueError(f"{key}.toml: its key is {data.get('key')!r}; make it {key!r}")
     parts = [f.name for f in fields(Paper) if f.name not in ("key", "margins")]
     if absent := [part for part in parts if part not in data]:
         raise ValueError(f"{key}.toml lacks {', '.join(absent)}; add them")
     if unknown := data.keys() - {"key", *parts}:
         raise ValueError(f"{key}.toml: unknown part {', '.join(sorted(unknown))}; remove it")
+    _check_types(key, data)
     _check_tables(key, data)
     claims: dict[str, Claim] = {}
     for entry in data["claims"]:
@@ -55,9 +59,36 @@ def load(key: str) -> Paper:
         _validate(claim, data)
         claims[claim.id] = claim
     margins = resources.files("rcbook").joinpath("papers", f"{key}.margins.json")
-    measured = json.loads(margins.read_text(encoding="utf-8")) if margins.is_file() else {}
+    try:
+        measured = json.loads(margins.read_text(encoding="utf-8")) if margins.is_file() else {}
+        measured = measured.get("claims", {})
+    except (ValueError, AttributeError):
+        raise ValueError(f"{margins.name} is damaged; remove it and measure anew") from None
     given = _unmarked({part: data[part] for part in parts}) | {"claims": claims}
-    return Paper(key, **given, margins=measured.get("claims", {}))
+    return Paper(key, **given, margins=measured)
+
+
+_TYPES = {"title": str, "citation": str, "notebook": str, "chapter": int, "claims": list}
+
+
+def _check_types(key: str, data: Mapping) -> None:
+    tables = dict.fromkeys(("idea", "conventions", "errata", "changes"), dict)
+    for name, kind in (_TYPES | tables).items():
+        if not isinstance(data[name], kind) or isinstance(data[name], bool):
+            raise ValueError(f"{key}.toml: {name} = {data[name]!r} is no {kind.__name__}; mend it")
+    if data["chapter"] < 1 or not data["title"].strip():
+        raise ValueError(f"{key}.toml: give a title and a chapter of 1 or more")
+    if not data["notebook"].endswith(".ipynb") or {"/", "\\"} & {*data["notebook"]}:
+        raise ValueError(f"{key}.toml: notebook {data['notebook']!r}; give the name of a notebook")
+    for entry in data["claims"]:
+        if not isinstance(entry, dict):
+            raise ValueError(f"{key}.toml: claim {entry!r} is no table; write [[claims]]")
+        for name, given in entry.items():
+            number = isinstance(given, int | float) and not isinstance(given, bool)
+            if not (number if name == "tolerance" else isinstance(given, str)):
+                wanted = "a number" if name == "tolerance" else "a text in quotes"
+                at = entry.get("id", "a claim without id")
+                raise ValueError(f"{key}.toml, {at}: {name} = {given!r}; give {wanted}")
 
 
 _TABLES = {  # fields that must be there, and fields that may be
@@ -78,9 +109,19 @@ def _check_tables(key: str, data: Mapping) -> None:
             raise ValueError(f"{key}.toml, [{at}]: lacks {', '.join(sorted(absent))}; add it")
         if unknown := entry.keys() - needed - optional:
             raise ValueError(f"{key}.toml, [{at}]: unknown {', '.join(sorted(unknown))}; remove it")
+        for name, given in entry.items():
+            if name != "sizes" and not isinstance(given, str):
+                raise ValueError(f"{key}.toml, [{at}]: {name} = {given!r}; give a text in quotes")
         sizes = entry.get("sizes", [1])
-        if at.startswith("changes") and not (sizes and all(size > 0 for size in sizes)):
+        if not isinstance(sizes, list) or not sizes or not all(map(_is_size, sizes)):
             raise ValueError(f"{key}.toml, [{at}]: sizes {sizes!r}; give one or more above 0")
+        if "rcbook.ledger" in entry.get("apply", "") or ".check" in entry.get("apply", ""):
+            raise ValueError(f"{key}.toml, [{at}]: it reaches for the verdicts; change the model")
+
+
+def _is_size(size: object) -> bool:
+    number = isinstance(size, int | float) and not isinstance(size, bool)
+    return number and 0 < size < math.inf
 
 
 def source(key: str) -> dict:
@@ -88,7 +129,14 @@ def source(key: str) -> dict:
     file = resources.files("rcbook").joinpath("papers", f"{key}.toml")
     if not file.is_file():
         raise ValueError(f"no paper {key!r}; choose one of {', '.join(papers())}")
-    return tomllib.loads(file.read_text(encoding="utf-8"))
+    return _parsed(file)
+
+
+def _parsed(file) -> dict:
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except ValueError as error:  # no UTF-8, or no TOML
+        raise ValueError(f"{file.name}: {error}; mend it there") from None
 
 
 def _claim(paper: str, entry: Mapping) -> Claim:
@@ -171,5 +219,15 @@ def _unfit_verdict(claim: Claim) -> str:
 
 
 def quotes(reason: str) -> set[str]:
-    """The names in the braces of a claim's reason."""
-    return {name for _, name, _, _ in string.Formatter().parse(reason) if name}
+    """The names in the braces of a claim's reason.
+
+    Raises ValueError for a brace without a plain name, and for one within another.
+    """
+    found = set()
+    for _, name, spec, _ in string.Formatter().parse(reason):
+        if name is None:
+            continue
+        if not name.isidentifier() or "{" in (spec or ""):
+            raise ValueError(f"{{{name}}} is no name of a piece of evidence")
+        found.add(name)
+    return found

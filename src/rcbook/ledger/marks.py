@@ -14,6 +14,7 @@ figures and their like, years, code, and exponents and indices of formulas need 
 
 from __future__ import annotations
 
+import ast
 import re
 import string
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -28,8 +29,9 @@ COMPUTED, QUOTED, STRUCTURAL, CHOSEN, UNACCOUNTED = CLASSES = (
 )
 
 _COMMENT = re.compile(r"<!--\s*(.*?)\s*-->", re.DOTALL)
-_DIGITS = r"\d{1,3}(?:,\d{3})+(?![\d,])|\d+(?:\.\d+)?"
-_POWER = r"\s*\\times\s*10\s*\^\s*(?:\{\s*[-−+]?\d+\s*\}|\d)"
+_DIGITS = r"\d{1,3}(?:,\d{3})+(?![\d,])|\d+(?:\.\d+)?|(?<![\w.)}\]])\.\d+"
+_TIMES = r"\s*(?:\\times|\\cdot|×|·)\s*10\s*\^\s*"
+_POWER = rf"{_TIMES}(?:\{{\s*[-−+]?\d+\s*\}}|\d)"
 _SIGN = r"(?:(?<![\w.)}\]])[-−+])?"
 _WORDS = (
     "thirteen|fourteen|fifteen|sixteen|seventeen|eighteen|nineteen|(?:twen|thir|for|fif|six|seven|"
@@ -40,25 +42,31 @@ _NUMBER = re.compile(
     re.IGNORECASE,
 )
 _PLACES = (
-    r"\b(?:eqs?|equations?|figs?|figures?|tables?|cases?|chs?|chapters?|sections?|secs?|steps?|"
-    r"pass|passes|appendix|exercises?|rules?|pages?|pp?|parts?|versions?|vol|no|tooth|teeth)\.?"
+    r"\b(?:eqs?|equations?|figs?|figures?|tables?|cases?|chs?|chapters?|sections?|secs?|"
+    r"passes|pass|appendix|exercises?|pages?|pp?|versions?|vol)\.?"
 )
+_UNITS = r"(?!\s*(?:lb|mm|Hz|rpm|percent|%|µm|ms)(?!\w))"
+_ITEM = rf"\(?[A-Z]?\d+[a-z]?\)?(?![.\d]*\d){_UNITS}"
 _PLACE = re.compile(
-    rf"{_PLACES}\s*\$?\(?[A-Z]?\d+[a-z]?\)?(?:(?:\s*,\s*(?:and\s+)?|\s+(?:and|to|or|with)\s+|[-–])"
-    r"\(?[A-Z]?\d+[a-z]?\)?(?![.\d]*\d))*",
+    rf"{_PLACES}\s*\$?{_ITEM}(?:(?:\s*,\s*(?:and\s+)?|\s+(?:and|to|or|with)\s+|[-–]){_ITEM})*",
     re.IGNORECASE,
 )
+_MONTHS = "January|February|March|April|May|June|July|August|September|October|November|December"
 _YEAR = re.compile(
-    r"(?<![=<>]\s)(?<![=<>\d.])\b(?:19[4-9]\d|20[0-3]\d)\b(?!\.?\d|\s*(?:%|rpm|samples))"
+    rf"(?:\((?:[^()]*,\s)?|\b(?:in|since|after|before|{_MONTHS})\s)(?:19[4-9]\d|20[0-3]\d)[a-z]?\b"
+    r"(?!\.?\d|\s*[A-Za-z%])"
 )
 _MATH = re.compile(r"\$\$.+?\$\$|\$[^$]+\$", re.DOTALL)
 _SCRIPT = re.compile(r"[_^](?:\{[^{}]*(?:\{[^{}]*\}[^{}]*)*\}|[-−+]?\w)")
 _SMALL = re.compile(r"[-−+]?[012]")
-_HIDDEN = re.compile(  # what is no text: code, targets of links, roles and labels, tags
-    r"```.*?```|`[^`]*`|\]\([^)]*\)|^\([\w-]+\)=$|<(?!--)/?[a-zA-Z][^<>]*>|^\s*\d+\.(?=\s)|"
-    r"^#+\s+\d+\.?(?=\s)|https?://\S+",
+_COMMAND = re.compile(r"\\(?!times|cdot)[A-Za-z]+")  # of TeX; a number may follow it at once
+_ATTRIBUTES = r"(?:\s+[\w-]+=(?:\"[^\"]*\"|'[^']*'))*\s*/?"
+_HIDDEN = re.compile(  # what is no text: code, targets of links, labels, tags, numbers of lists
+    r"```(?!\{).*?```|(?<![`}])`[^`\n]+`(?!`)|(?<=\{cite\})`[^`\n]+`|\]\([^)\s]*|^\([\w-]+\)=$|"
+    rf"</?[a-zA-Z][\w-]*{_ATTRIBUTES}>|^\s*\d+\.(?=\s)|^#+\s+\d+\.(?=\s)|https?://\S+",
     re.DOTALL | re.MULTILINE,
 )
+_BLANK_LINE = re.compile(r"\n[ \t]*\n")
 
 
 @dataclass(frozen=True)
@@ -82,19 +90,26 @@ def without_marks(text: str) -> str:
     return _COMMENT.sub("", text)
 
 
-def numbers(text: str, printed: Callable[[str], str] | None = None) -> list[Number]:
+def numbers(
+    text: str, printed: Callable[[str], str] | None = None, runs: bool = True
+) -> list[Number]:
     """Every number of `text` in order, with what accounts for it.
 
-    `printed` gives what a claim prints, by its id.
+    `printed` gives what a claim prints, by its id; `runs` says whether a run evaluates the text.
     Raises ValueError for a mark that has more braces than there are numbers before it in its
-    paragraph, that cannot be read, or that names no claim.
+    paragraph, that cannot be read, that names no claim, or that has braces where nothing runs.
     """
     marks = list(_COMMENT.finditer(text))
     seen = _blank(text, [*marks, *_HIDDEN.finditer(text)])
+    seen = _blank(
+        seen, [m for f in _MATH.finditer(seen) for m in _COMMAND.finditer(seen, *f.span())]
+    )
     found = [Number(m[0], m.start(), *_by_itself(seen, m)) for m in _NUMBER.finditer(seen)]
     since = 0
     for mark in marks:
-        begin = text.rfind("\n\n", 0, mark.start()) + 1
+        if "{" in mark[1] and not runs:
+            raise ValueError(f"<!-- {mark[1]} -->: nothing runs this text; use another mark")
+        begin = _start(text, mark.start())
         before = [
             i for i, n in enumerate(found) if begin <= n.start < mark.start() and not n.script
         ]
@@ -103,6 +118,14 @@ def numbers(text: str, printed: Callable[[str], str] | None = None) -> list[Numb
         if _is_mark(mark[1]):
             since = mark.end()
     return found
+
+
+def _start(text: str, at: int) -> int:
+    """Where the paragraph, or the row of a table, begins that `at` stands in."""
+    line = text.rfind("\n", 0, at) + 1
+    if text[line:].startswith("|"):
+        return line
+    return max((m.end() for m in _BLANK_LINE.finditer(text, 0, at)), default=0)
 
 
 def _blank(text: str, spans: Iterable[re.Match]) -> str:
@@ -164,32 +187,64 @@ def _fields(mark: str) -> list[tuple[str, str]]:
     fields = [(name, spec or "") for _, name, spec, _ in parsed if name is not None]
     if not all(name and spec for name, spec in fields):
         raise ValueError(f"<!-- {mark} -->: give {{expression:format}} in every brace")
+    for expression, spec in fields:
+        _check_expression(expression, spec)
     return fields
 
 
-def _values(printed: str) -> set[float]:
+def _check_expression(expression: str, spec: str) -> None:
+    """Refuse what computes nothing from the run, and what could change it."""
+    try:
+        nodes = list(ast.walk(ast.parse(expression.strip(), mode="eval")))
+    except SyntaxError as error:
+        raise ValueError(f"{{{expression}}} cannot be read: {error.msg}") from None
+    names = [node.id for node in nodes if isinstance(node, ast.Name)]
+    reached = [node.attr for node in nodes if isinstance(node, ast.Attribute)]
+    if not names or spec.endswith("s"):
+        raise ValueError(f"{{{expression}:{spec}}} takes no number from the run; name one of it")
+    if any(isinstance(node, ast.NamedExpr) for node in nodes) or {"check", "judge"} & {
+        *names,
+        *reached,
+    }:
+        raise ValueError(f"{{{expression}}} changes the run; a mark only reads")
+    if any(name.startswith("__") for name in (*names, *reached)):
+        raise ValueError(f"{{{expression}}} reaches inside; name a plain value")
+
+
+def _values(printed: str) -> set[tuple[str, int]]:
     return {_value(m[0]) for m in _NUMBER.finditer(printed)} - {None}
 
 
-def _value(number: str) -> float | None:
-    """A typed number; None for a word.  Signs are left out: prose says 'minus' in many ways."""
+def _value(number: str) -> tuple[str, int] | None:
+    """Digits and power of a typed number; None for a word.
+
+    Signs are left out, because prose says 'minus' in many ways.
+    """
     try:
         mantissa, exponent = _canonical(number)
     except ValueError:
         return None
-    return abs(float(f"{mantissa}e{exponent}"))
+    return mantissa.lstrip("-"), exponent
 
 
 def _canonical(number: str) -> tuple[str, int]:
     """Digits and power of ten of a number as typed or as formatted: `'4\\times10^{8}'` is 4, 8."""
     plain = number.strip().replace("−", "-").replace(",", "").rstrip("%").lstrip("+")
-    plain = re.sub(r"\s*\\times\s*10\s*\^\s*\{?\s*([-+]?\d+)\s*\}?", r"e\1", plain)
+    plain = re.sub(rf"{_TIMES}\{{?\s*([-+]?\d+)\s*\}}?", r"e\1", plain)
     mantissa, _, exponent = plain.lower().partition("e")
-    if not re.fullmatch(r"-?\d+(\.\d+)?", mantissa):
+    if not re.fullmatch(r"-?\d*\.?\d+", mantissa, re.ASCII):
         raise ValueError(f"{number!r} is no number in digits")
     if not float(mantissa):
         mantissa = mantissa.lstrip("-")
     return mantissa, int(exponent or 0)
+
+
+def is_number(computed: str) -> bool:
+    """Whether a formatted result is a finite number."""
+    try:
+        return bool(_canonical(computed))
+    except ValueError:
+        return False
 
 
 def same(typed: str, computed: str) -> bool:
@@ -218,12 +273,14 @@ def _retyped(old: str, computed: str) -> str:
     mantissa, exponent = _canonical(computed)
     if "−" in old:
         mantissa = mantissa.replace("-", "−")
-    if "times" in old:
-        return rf"{mantissa}\times10^{{{exponent}}}"
+    if power := re.search(_TIMES, old):
+        return f"{mantissa}{power[0]}{{{exponent}}}"
     return f"{mantissa}e{exponent}" if exponent else mantissa
 
 
-def of_template(text: str, quoted: Iterable[str] = ()) -> list[Number]:
+def of_template(
+    text: str, quoted: Iterable[str] = (), printed: Callable[[str], str] | None = None
+) -> list[Number]:
     """The numbers of a text of the data files: braces are computed, and `quoted` texts may be
     quoted without a mark, because they say what the paper prints."""
     known = {value for part in quoted for value in _values(without_marks(part))}
@@ -235,7 +292,7 @@ def of_template(text: str, quoted: Iterable[str] = ()) -> list[Number]:
             plain += "⟦⟧"
     found = [
         replace(n, kind=QUOTED) if n.kind == UNACCOUNTED and _value(n.text) in known else n
-        for n in numbers(plain)
+        for n in numbers(plain, printed, runs=False)
     ]
     return [*fields, *found]
 
