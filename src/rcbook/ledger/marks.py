@@ -63,7 +63,8 @@ _COMMAND = re.compile(r"\\(?!times|cdot)[A-Za-z]+")  # of TeX; a number may foll
 _ATTRIBUTES = r"(?:\s+[\w-]+=(?:\"[^\"]*\"|'[^']*'))*\s*/?"
 _HIDDEN = re.compile(  # what is no text: code, targets of links, labels, tags, numbers of lists
     r"```(?!\{).*?```|(?<![`}])`[^`\n]+`(?!`)|(?<=\{cite\})`[^`\n]+`|\]\([^)\s]*|^\([\w-]+\)=$|"
-    rf"</?[a-zA-Z][\w-]*{_ATTRIBUTES}>|^\s*\d+\.(?=\s)|^#+\s+\d+\.(?=\s)|https?://\S+",
+    rf"</?[a-zA-Z][\w-]*{_ATTRIBUTES}>|^\s*\d+\.(?=\s)|^#+\s+\d+\.(?=\s)|"
+    r"^:(?!alt\b)[\w-]+:[^\n]*$|https?://\S+",
     re.DOTALL | re.MULTILINE,
 )
 _BLANK_LINE = re.compile(r"\n[ \t]*\n")
