@@ -9,7 +9,7 @@ import nbformat
 import numpy as np
 import pytest
 from conftest import ROOT
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize
 
 from rcbook import ledger
 from rcbook.book import falsify
@@ -178,12 +178,10 @@ def test_a_cancelled_zero_outside_stays_as_a_root(computed):
     assert grown["force_lb"] < 25
 
 
-def test_pi_control_holds_the_plant_with_its_slow_pole_outside(computed):
+def test_pi_control_holds_the_plant_with_either_pole_outside(computed):
+    """Cubics multiplied out; with the fast pole outside only a negative Kp will do."""
     row = computed["ch7.unstable-poles"]
-    for which, name in ((0, "slow"), (1, "fast")):
-        poles = [SLOW, FAST]
-        poles[which] = 1 / poles[which]
-        assert row[name] == pytest.approx(poles[which], rel=SAME)
+    assert (row["slow"], row["fast"]) == pytest.approx((1 / SLOW, 1 / FAST), rel=SAME)
     a1, a2 = -(1 / SLOW + FAST), FAST / SLOW
     largest = max(abs(np.roots(closed_loop(a1=a1, a2=a2)[0])))
     assert row["with_slow"] == pytest.approx(largest, rel=1e-9) and largest < 1
@@ -192,7 +190,36 @@ def test_pi_control_holds_the_plant_with_its_slow_pole_outside(computed):
     least = min(
         max(abs(np.roots(closed_loop(kp, kp * (alpha - 1), a1, a2)[0]))) for kp, alpha in grid
     )
-    assert row["with_fast"] == pytest.approx(least, rel=1e-9) and least > 1
+    assert row["on_map"] == pytest.approx(least, rel=1e-9) and least > 1
+    p = closed_loop(row["kp"], row["ki"], a1, a2)[0]
+    assert row["with_fast"] == pytest.approx(max(abs(np.roots(p))), rel=1e-9)
+    assert row["with_fast"] < 1 and row["kp"] < 0
+    # Jury's conditions: values at 1 and -1, and the product of the roots
+    b, c, d = p[1:]
+    assert min(1 + b + c + d, 1 - b + c - d, 1 - d**2 - abs(c - b * d)) > 0
+    # the product limits ki; with the largest and Kp = 0 the value at -1 has the wrong sign, and
+    # it grows with Kp: for no Kp >= 0 is there an integral gain
+    most_ki = (-a2 + 1) / -B1
+    assert np.polyval(closed_loop(0.0, most_ki, a1, a2)[0], -1) > 0 and B0 > B1
+
+
+def test_a_late_sample_takes_the_fast_pole_from_pi_control(computed):
+    """The same grid with the numerator a sample later; a local search finds nothing below one."""
+    open_loop = np.pad(np.convolve([1, -1], [1, -(SLOW + 1 / FAST), SLOW / FAST]), (0, 1))
+
+    def radius(gains):
+        return max(abs(np.roots(open_loop + np.pad(np.convolve(gains, [B0, B1]), (2, 0)))))
+
+    pairs = [(kp, ki) for kp in np.linspace(-0.975, 0.975, 40) for ki in np.linspace(0.05, 1, 20)]
+    best = min(pairs, key=radius)
+    assert computed["ch7.unstable-poles"]["later"] == pytest.approx(radius(best), rel=1e-9)
+    found = minimize(radius, best, method="Nelder-Mead", options={"maxiter": 4000})
+    assert 1 < found.fun <= radius(best)
+
+
+def test_the_limits_of_the_gain_are_those_of_the_condition_of_eq_16(computed):
+    """|1 - k| < 1, and the roots of the memory for six samples a turn, |1 - k|^(1/6)."""
+    assert computed["eq16.kr-range"] == pytest.approx([0, 2], abs=1e-6)  # the word theorem
 
 
 def test_one_late_sample_leaves_pi_control_stable_and_the_memory_not(computed):
@@ -253,6 +280,14 @@ def test_ends_of_the_satisfactory_band_are_roots_and_not_grid_points(computed):
     assert fault(high, SHAKEN) == pytest.approx(0, abs=1e-7)
     assert fault(low - 1e-3, SHAKEN) > 0 > fault(low + 1e-3, SHAKEN)
     assert fault(high + 1e-3, SHAKEN) > 0 > fault(high - 1e-3, SHAKEN)
+
+
+def test_no_gain_up_to_0p6_is_within_ten_percent_after_two_turns(computed):
+    gains = np.append(np.arange(0.29, 0.6, 0.02), 0.6)
+    off = [max(abs(run(k, w)[0][12:] - 20)) for k in gains for w in (QUIET, SHAKEN)]
+    row = computed["ch6.kr-sluggish"]
+    assert row["least_lb"] == pytest.approx(min(off), rel=1e-9) and min(off) > 2
+    assert row["quiet_low"] == pytest.approx(1 - np.sqrt(0.1), rel=1e-9)  # of the staircase
 
 
 def test_the_upper_end_of_the_quiet_band_is_exactly_the_yardstick():
@@ -324,6 +359,36 @@ def test_half_a_sine_in_the_fast_pole_makes_twelve_samples_a_turn_unstable(compu
     assert computed["fig22.n12-oscillates"]["plus_half"] == pytest.approx(over, rel=1e-6)
     force, _ = run(0.8, wave(480, 12), 12, 0, impulse(480, 12, 0.5))
     assert np.ptp(force[360:]) > np.ptp(force[240:360])  # it grows: no transient
+
+
+def test_one_reading_meets_three_printed_statements_of_figs_22_and_23(computed):
+    """Re-sampled, without runout, begun at once: time at 2, settling at 12, and the band."""
+    tried = {n: resampled(n, w=0) for n in (2, 4, 6, 8, 10, 12)}
+    assert tried[2][1] == pytest.approx(1.60, rel=SAME) and tried[2][1] > 1.5
+    assert computed["fig22.n12-settling"] == pytest.approx(0.2, rel=SAME)  # same coefficients
+    assert tried[12][0] == pytest.approx(29 / 120, rel=SAME) and tried[12][0] < 0.3
+    good = [n for n, (ten, _, over) in tried.items() if ten <= 0.2 + SAME and over < 20]
+    assert good == [6, 8, 10]
+
+
+@pytest.mark.parametrize("per_turn, turns", [(2, 2.5), (6, 1.5)])
+def test_a_memory_that_alone_waits_for_its_lags_idles_half_a_turn_less(per_turn, turns):
+    """Eqs 24 to 28 in a loop from k = 0 on, with V_r kept at zero up to k = N + 2."""
+    before, n, h = 2 * per_turn + 8, 40, impulse(40)
+    memory, error, inner, command = np.zeros((4, before + n))
+    force = np.zeros(n)
+    for k in range(n):
+        i = before + k
+        force[k] = h[1 : k + 1][::-1] @ command[before:i]
+        error[i] = 20 - force[k]
+        if k >= per_turn + 2:
+            u = sum(Q[j] * memory[i - per_turn - j] for j in range(3))
+            u -= Q[1] * memory[i - 1] + Q[2] * memory[i - 2]
+            u += sum(0.8 * P[j] * error[i - per_turn + 1 - j] for j in range(4))
+            memory[i] = u / Q[0]
+        inner[i] = memory[i] - force[k]
+        command[i] = command[i - 1] + KP * inner[i] + KI * inner[i - 1]
+    assert np.flatnonzero(np.abs(force) > SAME)[0] / per_turn == turns
 
 
 # ---- captions ----
