@@ -654,14 +654,14 @@ OUTCOMES = {  # spreads of turns 1 to 10, control from turn 4 on; turn 7 is half
 }
 
 
-def with_spreads(spreads, standstill=None):
-    """A run whose peaks alternate by a given spread in each turn."""
+def with_spreads(spreads, standstill=None, currents=10 * [1.0]):
+    """A run whose peaks alternate by a given spread, and whose current swings, in each turn."""
     one = Experiment(MILL, engaged=2, controlled=4, turns=10, substeps=1)
     high = 50 + np.repeat(np.array(spreads) / 2, 40) * np.where(np.arange(400) // 5 % 2, 1, -1)
     empty = np.zeros(401)
-    force = np.append(0, high)
+    force, current = np.append(0, high), np.append(0, np.repeat(currents, 40))
     return face_mill.Run(
-        one, *[empty] * 4, force, *[empty] * 5, seen=empty, command=empty, standstill=standstill
+        one, *[empty] * 4, force, *[empty] * 3, -current, current, empty, empty, standstill
     )
 
 
@@ -669,6 +669,12 @@ def with_spreads(spreads, standstill=None):
 def test_outcome_is_read_off_the_spreads(spreads, word):
     assert face_mill.outcome(with_spreads(spreads)) == word
     assert face_mill.outcome(with_spreads(spreads, standstill=8.5)) == "unstable"
+
+
+@pytest.mark.parametrize("last, word", [(1.19, "stable"), (1.21, "unstable")])
+def test_a_growing_current_is_unstable_however_even_the_force(last, word):
+    spreads, _ = OUTCOMES["gone"]
+    assert face_mill.outcome(with_spreads(spreads, currents=[1.0] * 9 + [last])) == word
 
 
 @pytest.mark.parametrize("engaged, controlled, turns", [(2, 2, 10), (3, 2, 10), (2, 7, 10)])

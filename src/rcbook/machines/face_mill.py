@@ -29,6 +29,7 @@ LOGGED = ("time", "speed", "current", "force", "torque", "out_of_cut", "saturate
 LOGGED += ("lowest_current", "highest_current")
 ABREAST = 256  # runs computed side by side, few enough for the processor's cache
 STANDSTILL = 0.01  # of the nominal speed
+GROWTH = 1.2  # from halfway through control to the last turn, beyond which a loop is not settled
 NEWTON_STEPS = 30
 ROUNDING = 1e-13
 
@@ -390,12 +391,13 @@ def current_swing(run: Run, turn: int = -1) -> float:
 
 
 def outcome(run: Run) -> str:
-    """Whether control was "stable", "unstable" or "undecided", from the peaks per tooth pitch.
+    """Whether control was "stable", "unstable" or "undecided", from peak force and current.
 
-    Unstable is a standstill, or a spread of the peaks in the last turn not below that of the turn
-    before control.  Stable is less than half of it and no growth: not above 1.2 times the spread
-    halfway through control unless below a twentieth of the one before.  Undecided is what is
-    neither, and a cut whose peaks differ by less than a hundredth of the nominal force to begin
+    Unstable is a standstill, a spread of the peaks in the last turn not below that of the turn
+    before control, or a swing of the current that has grown to more than `GROWTH` times what it
+    was halfway through control.  Stable is less than half of the spread and no growth: not above
+    `GROWTH` times the spread halfway unless below a twentieth of the one before.  Undecided is what
+    is neither, and a cut whose peaks differ by less than a hundredth of the nominal force to begin
     with.  How slow a growth is seen depends on the number of turns.
     Raises ValueError when fewer than five turns are controlled or none is cut before.
     """
@@ -406,15 +408,16 @@ def outcome(run: Run) -> str:
             "give it a turn of cutting before control and five turns of control"
         )
     spreads = np.ptp(pitch_peaks(run), axis=1)
-    halfway = spreads[(one.controlled + one.turns) // 2 - 1]
+    middle = (one.controlled + one.turns) // 2
+    halfway, grown = spreads[middle - 1], current_swing(run) / (current_swing(run, middle) or 1.0)
     before, last = spreads[one.controlled - 2], spreads[-1]
     if run.standstill is not None:
         return "unstable"
     if before < 0.01 * one.mill.nominal_force:
         return "undecided"
-    if last >= before:
+    if last >= before or grown > GROWTH:
         return "unstable"
-    calm = last < before / 2 and last <= max(1.2 * halfway, before / 20)
+    calm = last < before / 2 and last <= max(GROWTH * halfway, before / 20)
     return "stable" if calm else "undecided"
 
 
