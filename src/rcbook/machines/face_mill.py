@@ -29,7 +29,7 @@ LOGGED = ("time", "speed", "current", "force", "torque", "out_of_cut", "saturate
 LOGGED += ("lowest_current", "highest_current")
 ABREAST = 256  # runs computed side by side, few enough for the processor's cache
 STANDSTILL = 0.01  # of the nominal speed
-GROWTH = 1.2  # from halfway through control to the last turn, beyond which a loop is not settled
+GROWTH = 1.01  # beyond which neither rounding nor convergence decides
 NEWTON_STEPS = 30
 ROUNDING = 1e-13
 
@@ -383,22 +383,29 @@ def torque_spreads(run: Run) -> np.ndarray:
     return np.nan_to_num(np.ptp(pitch_torques(run), axis=1), nan=np.inf)
 
 
+def current_swings(run: Run) -> np.ndarray:
+    """Half the range of the current in A within each turn; infinite once at rest."""
+    turns = run.experiment.turns
+    high = run.highest_current[1:].reshape(turns, -1).max(axis=1)
+    low = run.lowest_current[1:].reshape(turns, -1).min(axis=1)
+    return np.nan_to_num(high - low, nan=np.inf) / 2
+
+
 def current_swing(run: Run, turn: int = -1) -> float:
-    """Half the range of the current in A within a turn; infinite once at rest."""
-    part = run.during(turn)
-    whole = run.highest_current[part].max() - run.lowest_current[part].min()
-    return float(np.nan_to_num(whole, nan=np.inf)) / 2
+    """Half the range of the current in A within a turn counted as in `Run.during`."""
+    run.during(turn)
+    return float(current_swings(run)[turn - 1 if turn > 0 else turn])
 
 
 def outcome(run: Run) -> str:
     """Whether control was "stable", "unstable" or "undecided", from peak force and current.
 
     Unstable is a standstill, a spread of the peaks in the last turn not below that of the turn
-    before control, or a swing of the current that has grown to more than `GROWTH` times what it
-    was halfway through control.  Stable is less than half of the spread and no growth: not above
-    `GROWTH` times the spread halfway unless below a twentieth of the one before.  Undecided is what
+    before control, or a swing of the current that grows.  Stable is less than half of the spread
+    and no growth of it either, unless it is below a twentieth of the one before.  Undecided is what
     is neither, and a cut whose peaks differ by less than a hundredth of the nominal force to begin
-    with.  How slow a growth is seen depends on the number of turns.
+    with.  What grows is larger in the last quarter of control than in the two quarters before, by
+    more than the factor `GROWTH`.  How slow a growth is seen depends on the number of turns.
     Raises ValueError when fewer than five turns are controlled or none is cut before.
     """
     one = run.experiment
@@ -408,17 +415,21 @@ def outcome(run: Run) -> str:
             "give it a turn of cutting before control and five turns of control"
         )
     spreads = np.ptp(pitch_peaks(run), axis=1)
-    middle = (one.controlled + one.turns) // 2
-    halfway, grown = spreads[middle - 1], current_swing(run) / (current_swing(run, middle) or 1.0)
     before, last = spreads[one.controlled - 2], spreads[-1]
     if run.standstill is not None:
         return "unstable"
     if before < 0.01 * one.mill.nominal_force:
         return "undecided"
-    if last >= before or grown > GROWTH:
+    if last >= before or _grows(run, current_swings(run)):
         return "unstable"
-    calm = last < before / 2 and last <= max(GROWTH * halfway, before / 20)
+    calm = last < before / 2 and (last <= before / 20 or not _grows(run, spreads))
     return "stable" if calm else "undecided"
+
+
+def _grows(run: Run, values: np.ndarray) -> bool:
+    """Whether values by turns are larger in the last quarter of control than in the two before."""
+    quarter = max(1, (run.experiment.turns - run.experiment.controlled + 1) // 4)
+    return bool(values[-quarter:].max() > GROWTH * values[-3 * quarter : -quarter].max())
 
 
 def _side_by_side(group: list[Experiment]) -> list[Run]:
