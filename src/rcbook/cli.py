@@ -126,7 +126,7 @@ def _falsify(arguments: argparse.Namespace) -> int:
         lacking = falsify.unflipped(paper, tried)
         print("".join(f"UNFLIPPED {problem}\n" for problem in lacking), end="")
         problems += len(lacking)
-        shown += sum(claim.role in ledger.SCORED for claim in paper.claims.values())
+        shown += sum(claim.scored for claim in paper.claims.values())
         if arguments.measure and not lacking:
             falsify.store(paper, falsify.margins(paper, tried))
     print(f"{shown} scored claims, {problems} not shown to be falsifiable")

@@ -171,7 +171,7 @@ def unflipped(paper: Paper, tried: Sequence[Trial]) -> list[str]:
             if verdict != paper.claims[id].expected:
                 problems.append(f"{id}: {verdict} without a change; expected otherwise")
     for claim in paper.claims.values():
-        if claim.role not in ledger.SCORED or claim.expected == ledger.NOT_COMPUTABLE:
+        if not claim.scored or claim.expected == ledger.NOT_COMPUTABLE:
             continue
         trial = largest.get(claim.flips_under)
         if not claim.flips_under:
@@ -196,7 +196,7 @@ def margins(paper: Paper, tried: Sequence[Trial]) -> dict[str, dict]:
     for name, change in paper.changes.items():
         series = sorted((t for t in tried if t.change == name and t.size), key=lambda t: t.size)
         for claim in paper.claims.values():
-            if claim.role not in ledger.SCORED or claim.expected == ledger.NOT_COMPUTABLE:
+            if not claim.scored or claim.expected == ledger.NOT_COMPUTABLE:
                 continue
             reached = [t for t in series if claim.id in t.verdicts]
             flips = next((t for t in reached if t.verdicts[claim.id] != claim.expected), None)
