@@ -9,6 +9,8 @@ import nbformat
 import pytest
 from conftest import ROOT
 
+from rcbook.book import falsify
+
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 LINES = 15  # a longer cell hides the idea; move the mechanism into the package
 
@@ -46,6 +48,13 @@ def test_cells_are_short_and_hold_no_mechanism(path):
         assert not any(isinstance(node, ast.ClassDef) for node in defined), cell.id
         assert all(node.end_lineno - node.lineno < 12 for node in defined), cell.id
         assert len(defined) <= 1, cell.id
+
+
+@each
+def test_a_cell_that_judges_a_claim_is_not_passed_over_by_the_falsifier(path):
+    for cell in code_cells(path):
+        if falsify.SKIP in cell.metadata.get("tags", []):
+            assert not re.search(r"\bcheck\(", cell.source), cell.id
 
 
 @each
