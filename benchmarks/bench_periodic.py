@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from timing import seconds
 
-from rcbook import periodic
+from rcbook.loops import periodic
 from rcbook.machines.boring_bar import HANSON_TSAO2000, sinusoidal_intervals
 
 ROUTES = {

@@ -11,7 +11,7 @@ import control
 import numpy as np
 from timing import seconds
 
-from rcbook import repetitive
+from rcbook.loops import repetitive
 from rcbook.machines.peripheral_mill import HORNG1989
 
 PERIODS = (6, 60, 300)

@@ -10,9 +10,10 @@ import control
 import numpy as np
 import pytest
 
-from rcbook import identify, repetitive, signals, zdomain
+from rcbook import identify, signals, zdomain
+from rcbook.loops import repetitive
+from rcbook.loops.repetitive import Limit, Loop, Process, RepetitiveController
 from rcbook.machines import peripheral_mill
-from rcbook.repetitive import Limit, Loop, Process, RepetitiveController
 from rcbook.zdomain import NoncausalFilter, Plant
 
 NAN, INF = np.nan, np.inf

@@ -13,7 +13,8 @@ import pytest
 import scipy.linalg
 from scipy.optimize import brentq, minimize_scalar
 
-from rcbook import periodic, signals, zdomain
+from rcbook import signals, zdomain
+from rcbook.loops import periodic
 from rcbook.machines import boring_bar, chatter
 
 BAR = boring_bar.HANSON_TSAO2000

@@ -13,10 +13,11 @@ from math import pi
 import numpy as np
 import pytest
 
-from rcbook import ledger, repetitive, zdomain
+from rcbook import ledger, zdomain
+from rcbook.loops import repetitive
+from rcbook.loops.repetitive import RepetitiveController
 from rcbook.machines import face_mill
 from rcbook.machines.face_mill import EIGHT_TEETH, RANDOM_RUNOUT, RPM, Experiment
-from rcbook.repetitive import RepetitiveController
 
 MILL = EIGHT_TEETH
 FINE = {"substeps": 12, "inner": 16}

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 import scipy.integrate
 
-from rcbook import repetitive, zdomain
+from rcbook import zdomain
+from rcbook.loops import repetitive
+from rcbook.loops.repetitive import RepetitiveController
 from rcbook.machines import face_mill, spindle_drive
 from rcbook.machines.face_mill import EIGHT_TEETH, RANDOM_RUNOUT, RPM, Experiment
-from rcbook.repetitive import RepetitiveController
 
 MILL = EIGHT_TEETH
 HEAVY = replace(MILL, depth=4.5e-3)

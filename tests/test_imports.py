@@ -10,12 +10,12 @@ import rcbook
 PACKAGE = Path(rcbook.__file__).parent
 LAYERS = (
     {"zdomain", "signals", "ledger"},
-    {"identify", "repetitive", "learning", "periodic"},
+    {"identify", "loops"},
     {"machines"},
     {"pictures"},
     {"book", "cli"},
 )
-APART = ({"machines"}, {"identify", "repetitive", "learning", "periodic"})
+APART = ({"machines"}, {"identify", "loops"})
 MATHEMATICS = set().union(*LAYERS[:3])
 BANNED = {"matplotlib", "pandas", "nbclient", "nbformat", "IPython", "rich", "jupyter_client"}
 MODULES = sorted(path for path in PACKAGE.rglob("*.py") if path.name != "__init__.py")

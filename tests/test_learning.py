@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from rcbook import learning, repetitive, zdomain
-from rcbook.learning import CONTINUOUS, PERIODIC, RESET, LearningLaw, Start
+from rcbook import zdomain
+from rcbook.loops import learning, repetitive
+from rcbook.loops.learning import CONTINUOUS, PERIODIC, RESET, LearningLaw, Start
+from rcbook.loops.repetitive import Loop, Process, RepetitiveController
 from rcbook.machines import lathe
-from rcbook.repetitive import Loop, Process, RepetitiveController
 from rcbook.zdomain import NoncausalFilter, Plant
 
 SEEDS = range(4)

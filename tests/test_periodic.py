@@ -9,9 +9,10 @@ import pytest
 import scipy.linalg
 import scipy.signal
 
-from rcbook import periodic, zdomain
+from rcbook import zdomain
+from rcbook.loops import periodic
+from rcbook.loops.periodic import Compensator, PeriodicLoop, PeriodicPlant
 from rcbook.machines import boring_bar
-from rcbook.periodic import Compensator, PeriodicLoop, PeriodicPlant
 
 BAR = boring_bar.HANSON_TSAO2000
 Q20 = zdomain.symmetric_fir([0.8, 0.1])

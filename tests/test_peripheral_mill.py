@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from rcbook import repetitive
+from rcbook.loops import repetitive
+from rcbook.loops.repetitive import Process
 from rcbook.machines import peripheral_mill
 from rcbook.machines.peripheral_mill import HORNG1989, resample
-from rcbook.repetitive import Process
 from rcbook.zdomain import Plant
 
 PLANT = HORNG1989.plant

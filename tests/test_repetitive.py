@@ -6,8 +6,9 @@ import pytest
 import scipy.linalg
 import scipy.signal
 
-from rcbook import repetitive, zdomain
-from rcbook.repetitive import Limit, Loop, Process, RepetitiveController
+from rcbook import zdomain
+from rcbook.loops import repetitive
+from rcbook.loops.repetitive import Limit, Loop, Process, RepetitiveController
 from rcbook.zdomain import NoncausalFilter, Plant
 
 SEEDS = range(4)

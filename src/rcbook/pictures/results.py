@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
+from rcbook.loops.repetitive import Run
 from rcbook.machines import face_mill
 from rcbook.machines.peripheral_mill import PeripheralMill
-from rcbook.repetitive import Run
 from rcbook.zdomain import Plant
 
 LABELS = {
