@@ -145,7 +145,7 @@ class RepetitiveController:
     """gain C H/(1 - H): compensator C, memory H; a number for H is the period of a plain one.
 
     Raises ValueError when the look-ahead of C does not fit into the delay of the memory, and for a
-    gain that is not positive and finite.
+    gain that is not positive and finite; TypeError for a compensator that is no NoncausalFilter.
     """
 
     compensator: NoncausalFilter
@@ -153,6 +153,11 @@ class RepetitiveController:
     gain: float
 
     def __post_init__(self) -> None:
+        if not isinstance(self.compensator, NoncausalFilter):
+            raise TypeError(
+                f"compensator = {self.compensator!r}: give a NoncausalFilter, such as "
+                "zdomain.zero_phase_inverse(plant) or lead(samples)"
+            )
         object.__setattr__(self, "memory", as_memory(self.memory))
         gain = zdomain.real_number(self.gain, "repetitive gain", positive=True)
         object.__setattr__(self, "gain", gain)
@@ -216,8 +221,10 @@ def resonators(plant: Plant, period: float, harmonics: Sequence[int], gain: floa
 
     A small enough gain then shrinks the error of each by gain/2 a sample.
     Raises ValueError for harmonics that repeat or lie outside 0 to period/2, and for one that the
-    plant stops.
+    plant stops; TypeError for what is no Plant.
     """
+    if not isinstance(plant, Plant):
+        raise TypeError(f"plant = {plant!r}: give the Plant that the resonators act on")
     period = zdomain.real_number(period, "period", positive=True)
     if len(set(harmonics)) != len(harmonics) or not len(harmonics):
         raise ValueError(f"harmonics = {list(harmonics)}: name each of them once")
