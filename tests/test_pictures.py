@@ -1,6 +1,5 @@
 """The pictures: what a wire may say, that text stays readable, that grey print loses nothing."""
 
-import inspect
 from dataclasses import replace
 from functools import partial
 from itertools import combinations, pairwise
@@ -57,6 +56,11 @@ def missing(draw, *parts):
     return [part for part in parts if part not in text]
 
 
+def keeps_the_rules(draw):
+    for rule in layouts.RULES:
+        rule(rendered(draw)[1])
+
+
 # --- the rules, for every drawing ----------------------------------------------------------------
 
 
@@ -82,13 +86,9 @@ def test_the_same_drawing_gives_the_same_file(tmp_path, name):
     assert (tmp_path / "first.svg").read_bytes() == (tmp_path / "second.svg").read_bytes()
 
 
-def test_every_drawing_is_handed_on_by_the_package():
-    names = {name.split(",")[0] for name in LAYOUTS}
-    assert len(names) >= 12
-    assert names == {name for name in names if hasattr(pictures, name)}
-    results = inspect.getmembers(pictures.results, inspect.isfunction)
-    own = {n for n, f in results if f.__module__ == pictures.results.__name__ and n[0] != "_"}
-    assert own == {name for name in own if hasattr(pictures, name)}
+def test_there_are_drawings_of_loops_and_of_every_machine():
+    assert len({name.split(",")[0] for name in LAYOUTS}) >= 12
+    assert {name.split("_")[-1] for name in LAYOUTS} >= {"setup", "loop", "drive", "regeneration"}
 
 
 # --- and that they catch what they should ---------------------------------------------------------
@@ -152,11 +152,10 @@ def test_a_planted_fault_is_caught(name):
 
 
 def test_a_diagram_without_a_fault_passes():
-    for rule in layouts.RULES:
-        rule(rendered(partial(box, wires=[STRAIGHT, Wire((0, 2), "a", "$r$")]))[1])
+    keeps_the_rules(partial(box, wires=[STRAIGHT, Wire((0, 2), "a", "$r$")]))
 
 
-def test_a_new_module_is_found_without_being_listed(tmp_path, monkeypatch):
+def test_a_new_module_is_found_and_handed_on_without_being_listed(tmp_path, monkeypatch):
     source = (
         "def draw_planted(ax, word=''):\n    return ax\n\ndef draw_part(ax, needed):\n    pass\n"
     )
@@ -164,6 +163,7 @@ def test_a_new_module_is_found_without_being_listed(tmp_path, monkeypatch):
     monkeypatch.setattr(pictures, "__path__", [*pictures.__path__, str(tmp_path)])
     found = layouts.discover()
     assert found.keys() - LAYOUTS.keys() == {"draw_planted", "draw_planted, all texts"}
+    assert pictures.drawings(pictures.__path__).keys() >= {"draw_planted", "draw_cut", "draw_bore"}
     with pytest.raises(AssertionError, match="returns its axes"):
         rendered(lambda ax: None)
 
@@ -275,9 +275,8 @@ def test_texts_may_be_long():
     signals = (r"$F_\mathrm{ref}$", "force error", "feed command $V$", "$F$")
     plant = r"$\dfrac{z^{-d}\,Q(z^{-1})}{P(z^{-1})}$"
     parts = ("repetitive\ncontroller", plant)
-    draw = partial(pictures.draw_feedback_loop, parts=parts, signals=signals, disturbance="runout")
-    for rule in layouts.RULES:
-        rule(rendered(draw)[1])
+    texts = {"parts": parts, "signals": signals, "disturbance": "runout"}
+    keeps_the_rules(partial(pictures.draw_feedback_loop, **texts))
 
 
 def test_signs_of_a_sum_fed_from_the_right_and_from_below_stay_apart():
@@ -342,8 +341,7 @@ def test_loops_nest_and_each_controller_has_its_own_error():
     draw = partial(pictures.draw_feedback_loop, parts=parts, signals=signals, **texts)
     runs(draw, ("$r$", "$e$", "$G_r$", "$v$", "$d$", "PI", "$u$", "$w$", "milling", "$F$"), ())
     assert counts(draw, "+", "−", "closed loop") == [4, 2, 1]
-    for rule in layouts.RULES:
-        rule(rendered(draw)[1])
+    keeps_the_rules(draw)
 
 
 def test_a_loop_with_a_signal_too_few_is_refused():
@@ -352,33 +350,63 @@ def test_a_loop_with_a_signal_too_few_is_refused():
         pictures.draw_feedback_loop(ax, ("outer", "inner", "plant"))
 
 
-def test_learning_goes_round_from_memory_to_plant_to_law_to_memory():
-    """Above to the right, below to the left: every text where its signal is."""
-    above = ("memory of\none pass", "$y_{m,L}$", "$G$", "$y_L$", "$y_r$")
-    below = ("$e_L$", "$H$", "$y_{m,L+1}$")
-    runs(pictures.draw_learning_loop, above, below)
-    assert counts(pictures.draw_learning_loop, *above, *below) == [1] * 8
+# Above to the right, below to the left: every text where its signal is; then every other text, and
+# how many signs there are.
+ROUND = {
+    "draw_learning_loop": (
+        ("memory of\none pass", "$y_{m,L}$", "$G$", "$y_L$", "$y_r$"),
+        ("$e_L$", "$H$", "$y_{m,L+1}$"),
+        (),
+        {"+": 3, "−": 1},
+    ),
+    "draw_spindle_drive": (
+        ("$U_w^*$", "velocity control", "50 A", "$U_i^*$", "voltage"),
+        ("armature", "$i$", "$C_{w1}$", "spindle", "$w$"),
+        (r"$T_\mathrm{cut}$", "back EMF", "$K_f$", "$C_{w2}$", "cut $G_d$"),
+        {"+": 4, "−": 4},
+    ),
+    "draw_angle_loop": (
+        ("$F_0$", "$L_n$", r"$F(z^{-1})\,z^{-N}$", "$C(z^{-1})$"),
+        ("spindle\ndrive", "$w$", "cut", "$F_{ti}$", r"$F_{t\max}$"),
+        (),
+        {"−": 1},
+    ),
+    "draw_periodic_loop": (
+        [f"${s}(k)$" for s in "rewuv"],
+        ("hold $T(k)$", "$v(t)$", "$G(s)$", "$y(t)$", "$y(k)$"),
+        ("$Q\\,q^{-(N-L)}$", "$q^{-L}$", "$G_c(k)$"),
+        {"+": 3, "−": 1},
+    ),
+}
 
 
-def test_the_position_is_subtracted_and_only_the_position():
+@pytest.mark.parametrize("name", ROUND)
+def test_signals_go_round_and_everything_is_named_once(name):
+    draw, (above, below, others, signs) = getattr(pictures, name), ROUND[name]
+    runs(draw, above, below)
+    assert counts(draw, *above, *below, *others) == [1] * len((*above, *below, *others))
+    assert dict(zip(signs, counts(draw, *signs), strict=True)) == signs
+
+
+def minus(draw, side):
+    """The sum that subtracts at this side of it."""
+    _, ax = rendered(draw)
+    at = np.subtract(places(ax)["−"], blocks.SIGN_SPOTS[side])
+    (found,) = (c for c in outlines(ax)[1] if np.allclose(c[:2], at))
+    return found
+
+
+def test_the_position_is_subtracted_where_its_wire_enters():
     _, ax = rendered(pictures.draw_learning_loop)
-    assert counts(pictures.draw_learning_loop, "+", "−") == [3, 1]
-    x, y, radius = max(outlines(ax)[1])  # the sum on the right
-    np.testing.assert_allclose(places(ax)["−"], np.add((x, y), blocks._SIGN_SPOTS["w"]))
+    x, y, radius = minus(pictures.draw_learning_loop, "w")
     (wire,) = (w for w in layouts.wires(ax) if np.allclose(w[-1], (x - radius, y)))
     assert wire[0, 0] < places(ax)["$y_L$"][0] < wire[-1, 0]
 
 
-def test_the_drive_names_every_block_and_signal_once():
-    signals = ("$U_w^*$", "$U_i^*$", "voltage", "$i$", "$w$", r"$T_\mathrm{cut}$", "back EMF")
-    parts = ("50 A", "$K_f$", "$C_{w1}$", "$C_{w2}$", "cut $G_d$")
-    assert counts(pictures.draw_spindle_drive, *signals, *parts) == [1] * 12
-    assert counts(pictures.draw_spindle_drive, "+", "−") == [4, 4]
-
-
-def test_the_drive_runs_right_above_and_left_below():
-    above = ("$U_w^*$", "velocity control", "50 A", "$U_i^*$", "voltage")
-    runs(pictures.draw_spindle_drive, above, ("armature", "$i$", "$C_{w1}$", "spindle", "$w$"))
+def test_the_output_of_the_periodic_loop_is_subtracted_on_the_left():
+    _, ax = rendered(pictures.draw_periodic_loop)
+    sums = [c for c in outlines(ax)[1] if c[2] > 0.2]
+    assert minus(pictures.draw_periodic_loop, "s") == min(sums)
 
 
 def test_only_the_cut_closes_a_dashed_loop():
@@ -396,35 +424,40 @@ def test_the_loop_holds_and_samples_at_the_step_of_the_machine(samples, step):
     assert [t for t in words(ax) if step in t] == [f"hold {step}", f"sampled\nevery {step}"]
 
 
-def test_the_loop_learns_before_it_inverts_and_subtracts_only_the_force():
-    above = ("$F_0$", "$L_n$", r"$F(z^{-1})\,z^{-N}$", "$C(z^{-1})$")
-    below = ("spindle\ndrive", "$w$", "cut", "$F_{ti}$", r"$F_{t\max}$")
-    runs(pictures.draw_angle_loop, above, below)
-    assert counts(pictures.draw_angle_loop, "−") == [1]
+# --- the machines --------------------------------------------------------------------------------
+
+NAMED = {
+    "draw_milling_setup": (
+        *("four-flute", "3/8 in", "600 rpm", "runout", "spindle axis", "workpiece", "feed"),
+        *("dynamometer", "force", "30 Hz", "60 Hz", "computer", "mV", "CNC table"),
+    ),
+    "draw_lathe_setup": (
+        *("workpiece", "tool", "slide", "servo motor", "spindle encoder", "computer", "10 mm"),
+        *(r"angle $\theta$", "command $y_m$", "position $y$", r"$y_r(\theta)$"),
+    ),
+    "draw_face_mill_setup": (
+        *("spindle axis", "cutter centre", "runout", "workpiece", "entry, 0°", "exit, 180°"),
+        *("$w$", "$v_0$", "$F_t$", r"$\theta_i$", r"$\Delta\theta$"),
+        r"f_t\,\sin\theta_i+\Delta_i$",
+    ),
+    "draw_boring_setup": (
+        *("encoder", "chuck", "workpiece", "boring bar", "piezo", "holder", "feed", "46 µm"),
+        *("240 samples", r"$\Delta\theta$ = 1.5°", "$v(k)$", "$y(k)$", "$y$", r"$\theta$"),
+        *("computer", "amplifier", r"\omega_0\,[1+\mathrm{RVA}", r"$\omega$"),
+    ),
+    "draw_regeneration": (
+        *("mass $m$", "$k$", "$c$", "$x$", "tool", "workpiece", "phase shift", "chip"),
+        *("$h(t)=h_0+x(t-\\tau)-x(t)$", "$h(t)$", "$h_0$", "$x(t-\\tau)$", "$x(t)$", "$K\\,h(t)$"),
+    ),
+}
 
 
-def test_the_periodic_loop_names_every_signal_once_and_subtracts_only_the_output():
-    signals = [f"${s}(k)$" for s in "rewuvy"] + ["$v(t)$", "$y(t)$"]
-    parts = ["$Q\\,q^{-(N-L)}$", "$q^{-L}$", "$G_c(k)$", "$G(s)$", "hold $T(k)$"]
-    assert counts(pictures.draw_periodic_loop, *signals, *parts) == [1] * 13
-    assert counts(pictures.draw_periodic_loop, "+", "−") == [3, 1]
-
-
-def test_the_periodic_loop_runs_right_above_and_left_below():
-    below = ("hold $T(k)$", "$v(t)$", "$G(s)$", "$y(t)$", "$y(k)$")
-    runs(pictures.draw_periodic_loop, [f"${s}(k)$" for s in "rewuv"], below)
-    _, ax = rendered(pictures.draw_periodic_loop)
-    x, y, _ = min(outlines(ax)[1], key=lambda c: (c[2] < 0.2, c[0]))  # the left sum
-    np.testing.assert_allclose(np.subtract(places(ax)["−"], (x, y)), blocks._SIGN_SPOTS["s"])
+@pytest.mark.parametrize("name", NAMED)
+def test_a_machine_names_its_parts_and_signals(name):
+    assert missing(getattr(pictures, name), *NAMED[name]) == []
 
 
 # --- the milling machine -------------------------------------------------------------------------
-
-
-def test_milling_names_every_part_of_the_loop():
-    parts = ("four-flute", "3/8 in", "600 rpm", "runout", "spindle axis", "workpiece", "feed")
-    chain = ("dynamometer", "force", "30 Hz", "60 Hz", "computer", "mV", "CNC table")
-    assert missing(pictures.draw_milling_setup, *parts, *chain) == []
 
 
 def test_the_words_on_the_milling_machine_are_those_of_the_machine():
@@ -452,13 +485,6 @@ def test_the_drawn_edge_repeats_once_per_turn():
 
 
 # --- the lathe -----------------------------------------------------------------------------------
-
-
-def test_lathe_names_every_part_of_the_loop():
-    parts = ("workpiece", "tool", "slide", "servo motor", "spindle encoder", "computer", "10 mm")
-    signals = (r"angle $\theta$", "command $y_m$", "position $y$", r"$y_r(\theta)$")
-    assert missing(pictures.draw_lathe_setup, *parts, *signals) == []
-    assert " ".join(words(rendered(pictures.draw_lathe_setup)[1])).count("encoder") == 2
 
 
 def test_the_lathe_is_drawn_for_the_section_it_turns():
@@ -557,13 +583,6 @@ CUT = facing.Cutter(MILL)
 INSERTS = np.arange(1, 9)
 
 
-def test_face_mill_names_what_the_model_needs():
-    parts = ("spindle axis", "cutter centre", "runout", "workpiece", "entry, 0°", "exit, 180°")
-    signals = ("$w$", "$v_0$", "$F_t$", r"$\theta_i$", r"$\Delta\theta$")
-    chip = r"f_t\,\sin\theta_i+\Delta_i$"
-    assert missing(pictures.draw_face_mill_setup, *parts, *signals, chip) == []
-
-
 def test_inserts_are_numbered_against_the_rotation():
     """The angle of insert i is that of the cutter minus i - 1 pitches, clockwise."""
     at = places(rendered(pictures.draw_face_mill_setup)[1])
@@ -622,19 +641,10 @@ def test_the_drawn_chip_is_about_as_thick_as_the_label_says():
 # --- boring at a varying speed -------------------------------------------------------------------
 
 
-def test_boring_names_every_part_of_the_loop():
-    parts = ("encoder", "chuck", "workpiece", "boring bar", "piezo", "holder", "feed", "46 µm")
-    signals = ("240 samples", r"$\Delta\theta$ = 1.5°", "$v(k)$", "$y(k)$", "$y$", r"$\theta$")
-    chain = ("computer", "amplifier", r"\omega_0\,[1+\mathrm{RVA}", r"$\omega$")
-    assert missing(pictures.draw_boring_setup, *parts, *signals, *chain) == []
-
-
-@pytest.mark.parametrize(("samples", "step"), [(240, "1.5°"), (360, "1°")])
-def test_the_trigger_angle_belongs_to_the_samples_of_a_turn(samples, step):
-    _, ax = plt.subplots()
-    pictures.draw_boring_setup(ax, samples, 12.5e-6)
-    assert {f"{samples} samples a turn", "elliptical bore,\n25 µm peak to peak"} <= {*words(ax)}
-    assert any(w.endswith(f"= {step}") for w in words(ax))
+def test_the_trigger_angle_and_the_ellipse_belong_to_the_machine():
+    bar = replace(boring.MACHINED, sampling_interval=250e-6 * 2 / 3, amplitude=12.5e-6)
+    parts = ("360 samples a turn", "= 1°", "25 µm peak to peak")
+    assert missing(partial(pictures.draw_boring_setup, bar=bar), *parts) == []
 
 
 def tools(ax):
@@ -665,7 +675,7 @@ def test_the_bar_fits_into_the_bore_and_the_bore_into_the_pipe():
 
 def test_samples_lie_on_the_bore_at_equal_angles_one_at_the_mark_and_one_at_the_tool():
     _, ax = rendered(pictures.draw_boring_setup)
-    dots = np.array([c[:2] for c in outlines(ax)[1] if c[2] == 0.055]) - boring.END
+    dots = np.array([c[:2] for c in outlines(ax)[1] if c[2] < pen.DOT]) - boring.END
     angle = np.arctan2(*dots.T)
     np.testing.assert_allclose(np.hypot(*dots.T), bore_radius(angle), rtol=1e-12)
     np.testing.assert_allclose(np.diff(np.sort(angle)), 2 * np.pi / boring.DOTS, rtol=1e-9)
@@ -704,12 +714,6 @@ def test_the_strip_joins_equal_steps_of_the_angle_to_the_instants_of_the_speed_l
 
 
 # --- regenerative chatter ------------------------------------------------------------------------
-
-
-def test_regeneration_names_the_oscillator_and_the_chip():
-    oscillator = ("mass $m$", "$k$", "$c$", "$x$", "tool", "workpiece", "phase shift", "chip")
-    law = ("$h(t)=h_0+x(t-\\tau)-x(t)$", "$h(t)$", "$h_0$", "$x(t-\\tau)$", "$x(t)$", "$K\\,h(t)$")
-    assert missing(pictures.draw_regeneration, *oscillator, *law) == []
 
 
 def test_the_chip_is_measured_at_the_edge_of_the_tool_from_one_surface_to_the_other():
@@ -775,7 +779,7 @@ def chips(ax):
 def test_a_chip_is_as_long_as_its_thickness_magnified_and_where_its_tooth_is():
     _, ax = plt.subplots()
     angle, thickness = np.radians([90.0, 45.0, 0.0, -45.0]), np.array([60e-6, 30e-6, 0.0, 0.0])
-    assert pictures.draw_cutter_chips(ax, angle, thickness, 0.05, 200) is ax
+    assert pictures.draw_cutter_chips(ax, angle, thickness, 0.05, 200, 60e-6) is ax
     assert len(chips(ax)) == 2
     for xy, at, chip in zip(chips(ax), angle, thickness, strict=False):
         distance = np.hypot(*xy.T)
@@ -788,8 +792,7 @@ def test_a_chip_is_as_long_as_its_thickness_magnified_and_where_its_tooth_is():
 def test_cutters_with_the_same_feed_share_their_scale():
     _, axes = plt.subplots(1, 2)
     for ax, chip in zip(axes, (20e-6, 70e-6), strict=True):
-        pictures.draw_cutter_chips(ax, [np.pi / 2], [chip], 0.05, 200, feed=60e-6, numbered=False)
-        assert [t.get_text() for t in ax.texts] == ["200×"]
+        pictures.draw_cutter_chips(ax, [np.pi / 2], [chip], 0.05, 200, feed=60e-6)
         assert ax.lines[0].get_xdata().max() == pytest.approx(0.05 + 200 * 60e-6)
     assert axes[0].get_xlim() == axes[1].get_xlim()
     assert axes[0].get_ylim() == axes[1].get_ylim()
@@ -801,39 +804,28 @@ ANGLE = 2 * np.pi * np.arange(480) / 240  # two turns
 ELLIPSE = 23e-6 * np.sin(2 * ANGLE)
 
 
-def bore(*calls, **kwargs):
+def bore(error, magnified=1, reach=35e-6):
     _, ax = plt.subplots(subplot_kw={"projection": "polar"})
-    for call in calls:
-        assert pictures.draw_bore(ax, ANGLE, ELLIPSE, *call, **kwargs) is ax
+    assert pictures.draw_bore(ax, ANGLE, ELLIPSE, error, magnified, reach) is ax
     ax.get_figure().draw_without_rendering()
     return ax
 
 
 def test_a_bore_is_what_is_desired_less_the_magnified_error_in_micrometres():
-    ax = bore((4e-6 * np.cos(ANGLE), 2, "cut"))
+    ax = bore(4e-6 * np.cos(ANGLE), 2)
     circle, desired, cut = ax.lines
     assert np.all(circle.get_ydata() == 0)
     np.testing.assert_allclose(desired.get_ydata()[:-1], 1e6 * ELLIPSE)
     drawn = 1e6 * ELLIPSE - 8 * np.cos(ANGLE)
     np.testing.assert_allclose(cut.get_ydata(), [*drawn, drawn[0]])  # closed
-    assert ax.get_rmax() >= np.abs(drawn).max()
-    assert ax.get_rmin() == -ax.get_rmax()
     assert [t.get_text() for t in ax.texts] == ["rings\n±20 µm\nerror 2×"]
 
 
-def test_a_second_cut_repeats_neither_profile_nor_words_and_is_not_clipped():
-    ax = bore((0 * ANGLE, 1, "good"), (30e-6 * np.sin(ANGLE), 1, "bad"))
-    assert ax.get_legend_handles_labels()[1] == ["desired", "good", "bad"]
-    assert len(ax.lines) == 4
-    assert [t.get_text() for t in ax.texts] == ["rings\n±20 µm"]
-    assert ax.get_rmax() >= 53
-    assert len({c.get_linestyle() for c in ax.lines[2:]}) == 2
-
-
 def test_bores_with_the_same_reach_share_their_scale():
-    one, other = (bore((e * np.sin(ANGLE), 1), reach=35e-6) for e in (1e-6, 5e-6))
-    assert one.get_rmax() == other.get_rmax() == pytest.approx(35)
+    one, other = (bore(e * np.sin(ANGLE)) for e in (1e-6, 5e-6))
+    assert one.get_rmax() == other.get_rmax() == -one.get_rmin() == pytest.approx(35)
     assert one.get_rorigin() == other.get_rorigin()
+    assert [t.get_text() for t in one.texts] == ["rings\n±20 µm"]
 
 
 # --- the style -----------------------------------------------------------------------------------

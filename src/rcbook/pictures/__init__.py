@@ -1,39 +1,24 @@
 """Pictures of the book: block diagrams, machines and results, each drawn on a given axes.
 
-A new machine gets a module of its own here.  Its `draw_` functions need nothing but axes, have the
-machine's parameters as defaults and return the axes; the tests find them and apply their rules.
+A new machine gets a module of its own here.  Its `draw_` functions return the axes and are handed
+on by this package; those that need nothing but axes, with the machine's parameters as defaults, are
+made for a figure of about 8 by 4.2 inches, and the tests find them and apply their rules.
 """
 
-from rcbook.pictures.blocks import Block, Frame, Node, Sum, Wire, draw_block_diagram, path, row
-from rcbook.pictures.boring_bar import draw_boring_setup, draw_periodic_sampling
-from rcbook.pictures.chatter import draw_regeneration
-from rcbook.pictures.face_mill import draw_face_mill_setup
-from rcbook.pictures.lathe import draw_lathe_setup
-from rcbook.pictures.loops import (
-    draw_angle_loop,
-    draw_feedback_loop,
-    draw_learning_loop,
-    draw_periodic_loop,
-    draw_repetitive_generator,
-    draw_spindle_drive,
-)
-from rcbook.pictures.peripheral_mill import draw_milling_setup
-from rcbook.pictures.results import (
-    GREY,
-    LABELS,
-    draw_band,
-    draw_bore,
-    draw_cut,
-    draw_cutter_chips,
-    draw_locus,
-    draw_poles_zeros,
-    draw_section,
-    draw_signal,
-    draw_teeth,
-    draw_unit_circle,
-    draw_unit_disc,
-    draw_waviness,
-    mark_revolutions,
-    use_style,
-)
+import importlib
+import pkgutil
+from collections.abc import Callable, Iterable
+
+from rcbook.pictures.blocks import Block, Frame, Node, Sum, Wire, path, row
+from rcbook.pictures.results import GREY, LABELS, mark_revolutions, use_style
 from rcbook.pictures.sketch import Sketch
+
+
+def drawings(folders: Iterable[str]) -> dict[str, Callable]:
+    """Every `draw_` function of the modules in these folders, by name."""
+    found = (importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(folders))
+    members = (pair for module in found for pair in vars(module).items())
+    return {name: draw for name, draw in members if name.startswith("draw_")}
+
+
+globals().update(drawings(__path__))

@@ -3,25 +3,23 @@
 Lengths are in drawing units, one of which is about the height of a block.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import FancyBboxPatch, Rectangle
+from matplotlib.patches import FancyBboxPatch
 
 from rcbook.pictures.sketch import EM, HEAD, INK, LINE, PAPER, Point, Sketch, text_size
 
 LIMITED = ((-1.0, -1.0), (-0.4, -1.0), (0.4, 1.0), (1.0, 1.0))  # icon of a limit
 HELD = ((-1, -1), (-0.5, -1), (-0.5, 0.2), (0, 0.2), (0, 1), (0.5, 1), (0.5, -0.2), (1, -0.2))
-_RADIUS, _DOT = 0.24, 0.07  # of a sum and of a node
+SUM_RADIUS = 0.24
+SIGN_SPOTS = {"w": (-0.41, -0.25), "e": (0.41, -0.25), "n": (0.25, 0.40), "s": (0.25, -0.40)}
 _BASELINE = 0.17  # of a label above its wire
 _ICON = (0.5, 0.22)  # half width and half height
 _COMPASS = {(1, 0): "e", (-1, 0): "w", (0, 1): "n", (0, -1): "s"}
-_SIGN_SPOTS = {"w": (-0.41, -0.25), "e": (0.41, -0.25), "n": (0.25, 0.40), "s": (0.25, -0.40)}
 _BEFORE = {"baseline": 0.35, "bottom": 0, "center": 0.5, "top": 1, "left": 0, "right": 1}
 
 
@@ -87,6 +85,7 @@ class Wire:
 
 
 Item = Block | Sum | Node | Frame
+Label = tuple[str, float, float, dict[str, str]]  # text, its place and its alignment
 
 
 def draw_block_diagram(ax: Axes, items: Sequence[Item], wires: Sequence[Wire]) -> Axes:
@@ -97,11 +96,10 @@ def draw_block_diagram(ax: Axes, items: Sequence[Item], wires: Sequence[Wire]) -
     """
     routes = _routes(items, wires)
     points = [point for route in routes for point in route]
-    for item in items:
-        points += [np.subtract(item.xy, half_size(item)), np.add(item.xy, half_size(item))]
-    for text, x, y, style in _labels(items, wires, routes):
+    points += [np.add(i.xy, np.multiply(half_size(i), side)) for i in items for side in (-1, 1)]
+    for text, *xy, style in _labels(items, wires, routes):
         size = np.array(text_size(text))
-        corner = (x, y) - size * (_BEFORE[style["ha"]], _BEFORE[style["va"]])
+        corner = xy - size * (_BEFORE[style["ha"]], _BEFORE[style["va"]])
         points += [corner, corner + size]
     box = [*(np.min(points, axis=0) - 0.12), *(np.max(points, axis=0) + 0.12)]
     add_blocks(Sketch(ax, box, EM), items, wires)
@@ -150,7 +148,7 @@ def row(*parts: str | Item) -> tuple[list[Item], list[Wire]]:
 def half_size(item: Item) -> Point:
     """Half of an item's width and height."""
     if isinstance(item, Sum | Node):
-        return (_RADIUS if isinstance(item, Sum) else 0.0,) * 2
+        return (SUM_RADIUS if isinstance(item, Sum) else 0.0,) * 2
     if isinstance(item, Frame):
         return item.width / 2, item.height / 2
     width, height = text_size(item.text)
@@ -177,8 +175,7 @@ def _routes(items: Sequence[Item], wires: Sequence[Wire]) -> list[list[Point]]:
 
 
 def _route(wire: Wire, named: Mapping[str, Item]) -> list[Point]:
-    start = named[wire.start] if isinstance(wire.start, str) else Node("", wire.start)
-    end = named[wire.end] if isinstance(wire.end, str) else Node("", wire.end)
+    start, end = (named.get(e, Node("", e)) for e in (wire.start, wire.end))
     level = start.xy[1] if wire.via is None else wire.via
     bends = [start.xy, (start.xy[0], level), (end.xy[0], level), end.xy]
     bends = [start.xy, *(b for a, b in pairwise(bends) if not np.allclose(a, b))]
@@ -190,8 +187,9 @@ def _route(wire: Wire, named: Mapping[str, Item]) -> list[Point]:
             f"a wire enters the sum {end.name!r} from side {side!r}, which has no sign: "
             f"add {side!r} to its signs"
         )
-    first = tuple(np.add(start.xy, np.multiply(out, half_size(start))))
-    return [first, *bends[1:-1], tuple(np.add(end.xy, np.multiply(back, half_size(end))))]
+    borders = ((start, out), (end, back))
+    first, last = (tuple(np.add(i.xy, np.multiply(way, half_size(i)))) for i, way in borders)
+    return [first, *bends[1:-1], last]
 
 
 def _direction(here: Point, there: Point) -> tuple[int, int]:
@@ -202,8 +200,7 @@ def _direction(here: Point, there: Point) -> tuple[int, int]:
 
 def _labels(
     items: Sequence[Item], wires: Sequence[Wire], routes: Sequence[list[Point]]
-) -> list[tuple[str, float, float, dict[str, str]]]:
-    """Every text of a diagram, its place and its alignment."""
+) -> list[Label]:
     middle, above = {"ha": "center", "va": "center"}, {"ha": "center", "va": "baseline"}
     labels = []
     for item in items:
@@ -214,14 +211,14 @@ def _labels(
         if isinstance(item, Frame):
             labels.append((item.title, x - dx + 0.3, y - dy + 0.25, {**above, "ha": "left"}))
         for side, sign in item.signs.items() if isinstance(item, Sum) else ():
-            dx, dy = _SIGN_SPOTS[side]
+            dx, dy = SIGN_SPOTS[side]
             mirrored = side == "s" and "e" in item.signs
             labels.append((sign, x + (-dx if mirrored else dx), y + dy, middle))
-    labels += [_wire_label(wire, route) for wire, route in zip(wires, routes, strict=True)]
+    labels += map(_wire_label, wires, routes)
     return [label for label in labels if label[0]]
 
 
-def _wire_label(wire: Wire, route: Sequence[Point]) -> tuple[str, float, float, dict[str, str]]:
+def _wire_label(wire: Wire, route: Sequence[Point]) -> Label:
     """Beyond a free vertical tail, else above the longest level run, else right of the wire."""
     runs = list(pairwise(route))
     level = [run for run in runs if _direction(*run)[1] == 0]
@@ -237,17 +234,16 @@ def _wire_label(wire: Wire, route: Sequence[Point]) -> tuple[str, float, float, 
 
 
 def _draw_item(sketch: Sketch, item: Item) -> None:
-    (dx, dy), corner = half_size(item), np.subtract(item.xy, half_size(item))
+    half = np.array(half_size(item))
+    corner = item.xy - half
     if isinstance(item, Node):
-        sketch.circle(item.xy, _DOT, INK, 0)
+        sketch.dot(item.xy)
     elif isinstance(item, Sum):
-        sketch.circle(item.xy, _RADIUS)
+        sketch.circle(item.xy, SUM_RADIUS)
     elif isinstance(item, Frame):
-        dashes = {"linestyle": (0, (5, 3)), "edgecolor": "#5a5a5a", "linewidth": 1.0}
-        sketch.ax.add_patch(Rectangle(corner, 2 * dx, 2 * dy, fill=False, zorder=1, **dashes))
+        sketch.box(*corner, *2 * half, "none", 1.0, ec="#5a5a5a", linestyle=(0, (5, 3)), zorder=1)
     else:
-        ink = {"edgecolor": INK, "linewidth": LINE, "facecolor": item.fill, "zorder": 2}
         rounded = "round,pad=0,rounding_size=0.08"
-        sketch.ax.add_patch(FancyBboxPatch(corner, 2 * dx, 2 * dy, rounded, **ink))
+        sketch.shape(FancyBboxPatch(corner, *2 * half, rounded), item.fill)
         if item.icon:
             sketch.line(np.multiply(item.icon, _ICON) + item.xy + (0.0, _lift(item)))

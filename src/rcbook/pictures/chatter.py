@@ -1,13 +1,11 @@
 """Regenerative chatter: a tool on a spring cuts the wave that it left one turn ago."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import ArrayLike
 
-from rcbook.pictures import sketch as pen
 from rcbook.pictures.blocks import Block, add_blocks
-from rcbook.pictures.sketch import BOLD, DISTURBED, FOCUS, PLANT, THIN, TOOL, Sketch
+from rcbook.pictures.sketch import BOLD, DASHED, DISTURBED, FOCUS, LINE, PLANT, THIN, TOOL, Sketch
 
 TIP = 6.2  # where the tool's edge is along the cut
 CUT, CHIP = 2.15, 1.15  # mean height of the cut surface, and h0
@@ -18,11 +16,7 @@ MASS, ROOF = (6.75, 5.35), 7.7  # centre of the mass, and where its spring is he
 
 
 def draw_regeneration(ax: Axes) -> Axes:
-    """Draw regenerative chatter: a tool on a spring cuts the wave that it left one turn ago.
-
-    The surface is unrolled and moves to the right; on its right is what the tool has just cut.
-    Made for a figure of about 8 by 4.2 inches; the chatter marks are exaggerated.
-    """
+    """Draw a surface, unrolled and moving to the right, between a tool's last cut and its next."""
     sketch = Sketch(ax, (0.2, 0.2, 16.4, 8.5))
     _draw_marks(sketch)
     _draw_tool(sketch)
@@ -35,12 +29,12 @@ def draw_regeneration(ax: Axes) -> Axes:
     return ax
 
 
-def cut_surface(x: np.ndarray | float) -> np.ndarray:
+def cut_surface(x: ArrayLike) -> np.ndarray:
     """Height that the tool leaves, which rises now as it moves to the left."""
     return CUT + CREST * np.cos(2 * np.pi * (np.asarray(x) - TIP) / WAVE + LAG)
 
 
-def last_surface(x: np.ndarray | float) -> np.ndarray:
+def last_surface(x: ArrayLike) -> np.ndarray:
     """Height left one turn ago; the tool is at one of its crests."""
     return CUT + CHIP + CREST * np.cos(2 * np.pi * (np.asarray(x) - TIP) / WAVE)
 
@@ -55,22 +49,17 @@ def _draw_marks(sketch: Sketch) -> None:
     sketch.area([*cut, *gone[::-1]], FOCUS, 0)
     sketch.area([(LEFT, BOTTOM), *old, *cut, (RIGHT, BOTTOM)], PLANT)
     sketch.line(old, BOLD, DISTURBED)
-    sketch.line(gone, BOLD, DISTURBED, linestyle=pen.DASHED)
+    sketch.line(gone, BOLD, DISTURBED, linestyle=DASHED)
     sketch.line(cut, BOLD)
     sketch.arrow((3.4, 0.85), (5.3, 0.85))
 
-    tip, crest, at = cut_surface(TIP), last_surface(TIP), TIP - 1.15
-    for height in (tip, crest):
-        sketch.line([(at - 0.2, height), (TIP, height)], THIN)
+    low, high, at, mean = cut_surface(TIP), last_surface(TIP), TIP - 1.15, RIGHT + 0.15
+    sketch.span((at, low), (at, high), [(TIP, low), (TIP, high)])
     for height in (CUT, CUT + CHIP):
-        ends = [(TIP + 1.6, height), (RIGHT + 0.3, height)]
-        sketch.line(ends, THIN, pen.FAINT, linestyle=pen.CHAIN)
+        sketch.reference([(TIP + 1.6, height), (RIGHT + 0.3, height)])
+    sketch.span((mean, CUT), (mean, CUT + CHIP))
     old, cut = TIP + WAVE, TIP + WAVE * (1 - LAG / (2 * np.pi))
-    for x, height in ((old, last_surface(old)), (cut, cut_surface(cut))):
-        sketch.line([(x, height), (x, 4.5)], THIN)
-    mean = (RIGHT + 0.15, CUT), (RIGHT + 0.15, CUT + CHIP)
-    for start, end in (((at, tip), (at, crest)), mean, ((cut, 4.3), (old, 4.3))):
-        sketch.arrow(start, end, THIN, both=True)
+    sketch.span((cut, 4.3), (old, 4.3), [(cut, cut_surface(cut)), (old, last_surface(old))])
     sketch.words(("phase shift", (old + cut) / 2 - 0.35, 4.78, "left"))
     sketch.words(("$h(t)$", TIP - 0.55, CUT + 0.72), ("$h_0$", RIGHT + 0.3, CUT + 0.575, "left"))
 
@@ -92,5 +81,5 @@ def _draw_tool(sketch: Sketch) -> None:
     sketch.line([(x - 1.9, y), (x - 1.3, y)], THIN)
     sketch.words(("tool", TIP + 1.25, 4.1, "left"), ("$x$", x - 1.9, y + 0.35, "right"))
     sketch.words(("$k$", x - 1.0, high + 0.85, "right"), ("$c$", x + 1.05, high + 0.85, "left"))
-    sketch.arrow((x - 1.6, y), (x - 1.6, y + 1.0), pen.LINE)
+    sketch.arrow((x - 1.6, y), (x - 1.6, y + 1.0), LINE)
     add_blocks(sketch, [Block("mass", "mass $m$", MASS, width=2.3, height=1.15)], [])

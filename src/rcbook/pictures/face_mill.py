@@ -1,12 +1,16 @@
-"""Face milling seen along the spindle axis: inserts, what they cut, runout and force."""
+"""Face milling seen along the spindle axis, and plots of its runs, its teeth and its chips."""
 
-from __future__ import annotations
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patches import Circle, Polygon
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
+from rcbook.machines import face_mill
 from rcbook.machines.face_mill import EIGHT_TEETH, FaceMill
+from rcbook.pictures.results import AXES, GREY, bare_polar, turn_of
 from rcbook.pictures.sketch import DISTURBED, FOCUS, PLANT, STEEL, THIN, TOOL, Sketch, about
 
 AXIS = (5.3, 4.2)  # of the spindle
@@ -22,8 +26,7 @@ BODY = np.radians([-2, 0, 6, 14, 22, 43]), (2.3, 1.85, 1.8, 1.95, 2.3, 2.3)  # f
 def draw_face_mill_setup(ax: Axes, mill: FaceMill = EIGHT_TEETH) -> Axes:
     """Draw face milling of a full slot along the spindle axis: inserts, chips, runout and force.
 
-    A tooth enters the workpiece at the top, at 0 degrees, and leaves at the bottom.  Made for a
-    figure of about 7.5 by 3.9 inches; feed and runout are exaggerated, alike and about 200 times.
+    A tooth enters at the top and leaves at the bottom; feed and runout are exaggerated alike.
     """
     sketch, cutter = Sketch(ax), Cutter(mill)
     _draw_blank(sketch, cutter)
@@ -45,19 +48,16 @@ class Cutter:
 
     def __init__(self, mill: FaceMill) -> None:
         radius = np.cumsum(mill.runout)
-        self.mill, self.longest = (
-            mill,
-            int(np.argmax(radius)) + 1,
-        )  # the insert that reaches out most
+        self.mill, self.longest = mill, int(np.argmax(radius)) + 1  # reaches out most
         self.radii = RADIUS + TOOTH_FEED / mill.tooth_feed * (radius - radius.mean())
         turn = self.angle(np.arange(1, mill.teeth + 1))
         self.centre = AXIS + 2 * np.mean(about((0, 0), self.radii, turn), axis=0)
 
-    def angle(self, number: float | np.ndarray) -> float | np.ndarray:
+    def angle(self, number: ArrayLike) -> ArrayLike:
         """Where an insert stands now, in rad clockwise from the top."""
         return STANDS - (number - self.longest) * self.mill.pitch
 
-    def path(self, number: int, angle: float | np.ndarray) -> np.ndarray:
+    def path(self, number: int, angle: ArrayLike) -> np.ndarray:
         """Where an insert is on the workpiece at an angle (rad): its circle and the feed."""
         fed = TOOTH_FEED * (np.asarray(angle) - self.angle(number)) / self.mill.pitch
         circle = about(AXIS, self.radii[(number - 1) % self.mill.teeth], angle)
@@ -86,7 +86,7 @@ def _draw_blank(sketch: Sketch, cutter: Cutter) -> None:
         behind = [(path[-1, 0], down), (left, down)] if gone else [AXIS, (left, y)]
         cut = [(path[0, 0], up), *path]
         sketch.area([*cut, *behind, (left, up)], pen=0).set_clip_path(whole)
-        sketch.line(cut, clip_path=whole)
+        sketch.line(cut).set_clip_path(whole)
     sketch.box(*place, "none")
     sketch.arrow((13.9, 1.8), (12.3, 1.8))
 
@@ -103,17 +103,87 @@ def _draw_cutter(sketch: Sketch, cutter: Cutter) -> None:
         sketch.area([tip + r * outward + t * along for t, r in INSERT], fill)
         sketch.write(str(number), *(tip - outward - 0.27 * along))
     sketch.runout(AXIS, cutter.centre, RADIUS)
-    sketch.turn(AXIS, 3.2, -48.0, -10.0)
+    sketch.turn(AXIS, 3.2, np.radians([-48.0, -10.0]))
 
     (x, y), tip = AXIS, cutter.path(cutter.longest, STANDS)
     for line in ([AXIS, (x, y + 3.4)], [(x, y - RADIUS), (x, y - 3.2)], [AXIS, tip]):
         sketch.line(line, THIN)
-    sketch.turn(AXIS, 1.2, 0.0, np.degrees(STANDS))
-    sketch.arrow(*cutter.chip_ends(), THIN, both=True)
+    sketch.turn(AXIS, 1.2, (0.0, STANDS))
+    sketch.span(*cutter.chip_ends())
     sketch.arrow(tip, about(tip, 1.6, STANDS - np.pi / 2))  # against the way the insert moves
     ends = cutter.angle(cutter.longest + np.array([4, 3]))
     for end in ends:
         sketch.line(about(AXIS, [2.5, 3.55], end), THIN)
-        sketch.turn(AXIS, 3.3, np.degrees(ends.mean()), np.degrees(end), THIN)
+        sketch.turn(AXIS, 3.3, (ends.mean(), end), THIN)
     sketch.words((r"$\Delta\theta$", *about(AXIS, 3.75, ends.mean())))
     sketch.words((r"$\theta_i$", *about(AXIS, 0.8, STANDS / 2)), ("$F_t$", 8.30, 5.80))
+
+
+def draw_cut(axes: Sequence[Axes], run: face_mill.Run) -> None:
+    """Plot force, torque, current and speed of a run over revolutions, each on an axes of its own.
+
+    A thin line marks where the controller sets in.
+    """
+    for ax, name in zip(axes, ("force", "torque", "current", "speed"), strict=True):
+        ax.plot(run.turns, getattr(run, name), linewidth=0.9, linestyle="-")
+        ax.axvline(run.experiment.controlled - 1, color=GREY, linewidth=0.8, linestyle=":")
+        ax.set_ylabel(AXES[name])
+        ax.margins(x=0)
+    axes[-1].set_xlabel(f"{AXES['turns']} of the cutter")
+
+
+def draw_teeth(
+    ax: Axes, values: ArrayLike, reference: float, label: str = "", outlined: bool = False
+) -> Axes:
+    """Draw one bar per tooth from the hub of a cutter (`ax` is polar), and the reference dashed, N.
+
+    Tooth 1 is at the top, the others follow anticlockwise.  Bars are broad and grey, or narrow and
+    `outlined` to go over the broad ones.
+    """
+    angle, turn = turn_of(len(values)), np.linspace(0, 2 * np.pi, 361)
+    style = {"color": "0.80", "zorder": 2}
+    if outlined:
+        style = {"fill": False, "edgecolor": "black", "linewidth": 1.4, "zorder": 3}
+    ax.bar(angle, values, (0.5 if outlined else 0.84) * angle[1], label=label or None, **style)
+    ax.plot(turn, 0 * turn, color="0.3", linewidth=1.0, linestyle="-", zorder=3)
+    circle = {"color": "C1", "linewidth": 1.3, "linestyle": (0, (4, 2)), "zorder": 4}
+    named = None if outlined else f"nominal, {reference:.3g} N"
+    ax.plot(turn, 0 * turn + reference, label=named, **circle)
+    ax.set_theta_zero_location("N")
+    bare_polar(ax, {f"{i + 1}": at for i, at in enumerate(angle)})
+    ax.xaxis.grid(False)
+    ax.set_rmin(0)
+    ax.set_rorigin(-0.4 * reference)  # a hub, so that the bars do not crowd in the middle
+    return ax
+
+
+def draw_cutter_chips(
+    ax: Axes, angle: ArrayLike, thickness: ArrayLike, radius: float, magnified: float, feed: float
+) -> Axes:
+    """Draw the chips of all teeth outside of a cutter that turns clockwise, `magnified`; all in m.
+
+    Angles in rad run clockwise from the top, where a tooth enters.  A dashed line shows what the
+    `feed` per tooth would give without runout; drawings with the same feed share their scale.
+    """
+    arc, tall = np.linspace(0, np.pi, 181), magnified * feed
+    nominal, dashes = about((0, 0), radius + tall * np.sin(arc), arc), (0, (4, 2))
+    ax.plot(*nominal.T, color="0.35", linewidth=1.0, linestyle=dashes)
+    words = {"ha": "center", "va": "center", "fontsize": "small", "zorder": 5}
+    ax.text(0, 0, f"{magnified:g}×", **words)
+    half = min(0.13, 0.35 * np.pi / len(angle))
+    for i, (at, chip) in enumerate(zip(angle, thickness, strict=True)):
+        across = np.linspace(at - half, at + half, 9)
+        inner, outer = (about((0, 0), r, across) for r in (radius, radius + magnified * chip))
+        if chip > 0:
+            sliver = [*inner, *outer[::-1]]
+            ax.add_patch(Polygon(sliver, facecolor="C0", edgecolor="black", zorder=2))
+        edge = about((0, 0), [0.86 * radius, radius], at)
+        ax.plot(*edge.T, color="black", linestyle="-", zorder=4)
+        ax.text(*about((0, 0), 0.68 * radius, at), f"{i + 1}", **words)
+    body = {"facecolor": "0.88", "edgecolor": "0.3", "linewidth": 1.0, "zorder": 3}
+    ax.add_patch(Circle((0, 0), radius, **body))
+    high = radius + 0.8 * tall
+    ax.set(xlim=(-1.05 * radius, radius + 1.35 * tall), ylim=(-high, high))
+    ax.set_aspect("equal")
+    ax.set_axis_off()
+    return ax

@@ -1,9 +1,6 @@
 """The loops of the case studies: each is a table of items and of the wires between them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from itertools import chain
 
 from matplotlib.axes import Axes
 
@@ -26,10 +23,8 @@ def draw_feedback_loop(
 ) -> Axes:
     """Draw a unity feedback loop, or nested ones, from the texts of parts and signals in order.
 
-    Every part but the last, the plant, acts on an error of its own; the outermost comes first.
-    A `disturbance` enters at the plant's input, a text for `inner_loop` frames and names the
-    innermost loop, and `focus` tints the outermost controller.
-
+    Every part but the last, the plant, acts on an error of its own; the outermost comes first and
+    is tinted to be in `focus`.  A `disturbance` enters the plant; `inner_loop` names the innermost.
     Raises ValueError unless there are twice as many signals as parts.
     """
     if len(signals) != 2 * len(parts):
@@ -40,8 +35,9 @@ def draw_feedback_loop(
         line += [signals[2 * k], Sum(f"error {k}"), signals[2 * k + 1], block]
     load = [Sum("load", signs=_ADD), ""] if disturbance else []
     line += [signals[-2], *load, Block("plant", parts[-1], fill=PLANT)]
-    outputs = (("", Node(f"out {k}")) for k in range(last, -1, -1))
-    items, wires = row(*line, *chain(*outputs), signals[-1])
+    for k in range(last, -1, -1):
+        line += ["", Node(f"out {k}")]
+    items, wires = row(*line, signals[-1])
     at = {item.name: item.xy[0] for item in items}
     wires += [Wire(f"out {k}", f"error {k}", via=-1.3 - 0.7 * (last - k)) for k in range(last)]
     wires.append(Wire(f"out {last}", f"error {last}", inner_loop, via=-1.3))
@@ -53,14 +49,14 @@ def draw_feedback_loop(
     return blocks.draw_block_diagram(ax, items, wires)
 
 
-def draw_learning_loop(ax: Axes, law: str = "$H$", plant: str = "$G$") -> Axes:
+def draw_learning_loop(ax: Axes) -> Axes:
     """Draw learning from pass to pass: the error through the law corrects the next command."""
     items = [
         Block("memory", "memory of\none pass", (0.0, 0.0), FOCUS),
         Node("command", (3.2, 0.0)),
-        Block("plant", plant, (5.4, 0.0), PLANT),
+        Block("plant", "$G$", (5.4, 0.0), PLANT),
         Sum("error", (8.0, 0.0), {"w": "−", "n": "+"}),
-        Block("law", law, (5.4, -2.0), FOCUS),
+        Block("law", "$H$", (5.4, -2.0), FOCUS),
         Sum("corrected", (3.2, -2.0), {"n": "+", "e": "+"}),
     ]
     wires = [
@@ -75,10 +71,7 @@ def draw_learning_loop(ax: Axes, law: str = "$H$", plant: str = "$G$") -> Axes:
 
 
 def draw_repetitive_generator(ax: Axes) -> Axes:
-    """Draw the inside of a repetitive controller, `k_r q z^-(N-d) C / (1 - q z^-N)` as a whole.
-
-    The filter q and the advance nu of the inverse C lie inside the delay of one period.
-    """
+    """Draw the inside of a repetitive controller, `k_r q z^-(N-d) C / (1 - q z^-N)` as a whole."""
     items, wires = row(
         *("$e$", Block("gain", "$k_r$"), "", Sum("sum", signs={"w": "+", "s": "+"}), ""),
         *(Block("memory", r"$q(z)\,z^{-(N-d-\nu)}$", fill=FOCUS), "", Node("tap"), ""),
@@ -129,10 +122,7 @@ def draw_spindle_drive(ax: Axes, drive: SpindleDrive = TSAO_PONG1991) -> Axes:
 
 
 def draw_angle_loop(ax: Axes, mill: FaceMill = EIGHT_TEETH) -> Axes:
-    """Draw the repetitive loop that samples at equal steps of the cutter's turn.
-
-    Above is the controller `L_n F z^-N C / (1 - F z^-N)`, below is what turns with the cutter.
-    """
+    """Draw the repetitive loop that samples at equal steps of the cutter's turn."""
     step, size = f"{360 / mill.samples_per_turn:g}°", {"width": 2.0, "height": 1.5}
     items = [
         Sum("error", (1.9, 0.0)),
@@ -162,10 +152,7 @@ def draw_angle_loop(ax: Axes, mill: FaceMill = EIGHT_TEETH) -> Axes:
 
 
 def draw_periodic_loop(ax: Axes) -> Axes:
-    """Draw the repetitive loop whose hold and sampler act at equal steps of the spindle's turn.
-
-    Above is the controller, which repeats every N samples, below the plant in continuous time.
-    """
+    """Draw the repetitive loop whose hold and sampler act at equal steps of the spindle's turn."""
     size = {"width": 2.0, "height": 1.4}
     items = [
         *(Sum("error", (1.7, 0.0)), Sum("learned", (4.1, 0.0), _ADD)),

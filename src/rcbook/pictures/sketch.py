@@ -4,13 +4,12 @@ Lengths are in drawing units, one of which is about the height of a block.  What
 covers what was drawn before; words lie on top.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import Circle, Patch, Polygon
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Patch, Polygon, Rectangle
 from matplotlib.textpath import TextPath
 from numpy.typing import ArrayLike
 
@@ -20,9 +19,11 @@ PAPER, PLANT, STEEL, TOOL = "#ffffff", "#ececec", "#c4c4c4", "#6e6e6e"  # fills
 FOCUS = "#bad8f0"  # fill of what the picture is about; darker than PLANT in grey, too
 
 THIN, LINE, BOLD = 0.8, 1.2, 2.0  # the pens: widths in points
-DASHED, CHAIN = (0, (4, 2.5)), (0, (7, 2.5, 1.5, 2.5))
+DASHED = (0, (4, 2.5))
+DOT = 0.07  # radius of a marked point
 EM = 0.36  # font size of a block diagram in drawing units
-HEAD = 0.24  # length of an arrow head
+HEAD = 0.24  # length of the head of an arrow, which grows with the pen
+HEADS = {THIN: 0.8, LINE: 1.0, BOLD: 1.4}
 _LARGEST_FONT = 16.0  # points; a drawing stops growing with its axes here
 
 Point = tuple[float, float]
@@ -43,10 +44,7 @@ def about(centre: ArrayLike, radius: ArrayLike, angle: ArrayLike) -> np.ndarray:
 
 
 class Sketch:
-    """Axes in drawing units, with a thin pen, a line pen and a bold pen.
-
-    The axes show a `box` (left, bottom, right, top); `em` is the font size.
-    """
+    """Axes that show a box (left, bottom, right, top) in drawing units; `em` is the font size."""
 
     def __init__(self, ax: Axes, box: ArrayLike = (0, 0, 16, 8.4), em: float = 1.08 * EM) -> None:
         low, high = np.reshape(box, (2, 2))
@@ -62,27 +60,36 @@ class Sketch:
         ax.set(xlim=(left, right), ylim=(bottom, top))
         self.ax, self.em, self.font = ax, em, unit * em / shrink
 
-    def line(self, points: ArrayLike, pen: float = LINE, color: str = INK, **style) -> None:
+    def line(self, points: ArrayLike, pen: float = LINE, color: str = INK, **style) -> Line2D:
         """A line through points, one a row; `style` is Matplotlib's."""
         solid = {"linestyle": "-", "marker": "", "solid_capstyle": "butt", "zorder": 2}
-        self.ax.plot(*np.transpose(points), color=color, linewidth=pen, **{**solid, **style})
+        ink = {"color": color, "linewidth": pen, **solid, **style}
+        return self.ax.plot(*np.transpose(points), **ink)[0]
 
-    def area(self, points: ArrayLike, fill: str = PAPER, pen: float = LINE, **style) -> Patch:
-        """A filled outline through points, one a row; without a pen (0) it is only filled."""
-        ink = {"facecolor": fill, "edgecolor": INK, "linewidth": pen, "zorder": 2}
-        return self.ax.add_patch(Polygon(points, **{**ink, **style}))
+    def reference(self, points: ArrayLike) -> None:
+        """A thin chain line, as of an axis or of a mean."""
+        self.line(points, THIN, FAINT, linestyle=(0, (7, 2.5, 1.5, 2.5)))
+
+    def shape(self, shape: Patch, fill: str = PAPER, pen: float = LINE, **style) -> Patch:
+        """A filled shape of Matplotlib's; without a pen (0) it has no outline."""
+        shape.set(**{"fc": fill, "ec": INK, "linewidth": pen, "zorder": 2, **style})
+        return self.ax.add_patch(shape)
+
+    def area(self, points: ArrayLike, *ink, **style) -> Patch:
+        """An area inside of points, one a row; `ink` and `style` as for a shape."""
+        return self.shape(Polygon(points), *ink, **style)
 
     def box(self, left: float, bottom: float, width: float, height: float, *ink, **style) -> Patch:
-        """A filled rectangle; `ink` and `style` as for an area."""
-        corners = np.multiply([(0, 0), (0, 1), (1, 1), (1, 0)], (width, height))
-        return self.area(np.add(corners, (left, bottom)), *ink, **style)
+        """A rectangle; `ink` and `style` as for a shape."""
+        return self.shape(Rectangle((left, bottom), width, height), *ink, **style)
 
-    def circle(
-        self, centre: Point, radius: float, fill: str = PAPER, pen: float = LINE, **style
-    ) -> None:
-        """A filled circle; `style` is Matplotlib's."""
-        ink = {"facecolor": fill, "edgecolor": INK, "linewidth": pen, "zorder": 2}
-        self.ax.add_patch(Circle(tuple(centre), radius, **{**ink, **style}))
+    def circle(self, centre: Point, radius: float, *ink, **style) -> Patch:
+        """A circle; `ink` and `style` as for a shape."""
+        return self.shape(Circle(tuple(centre), radius), *ink, **style)
+
+    def dot(self, centre: Point, radius: float = DOT, color: str = INK) -> None:
+        """A marked point."""
+        self.circle(centre, radius, color, 0)
 
     def head(self, tip: Point, step: Point, scale: float = 1.0, color: str = INK, **style) -> None:
         """A filled arrow head whose tip is at `tip`; it points along the unit vector `step`."""
@@ -90,25 +97,27 @@ class Sketch:
         base = tip - along
         self.area([tip, base + 0.375 * across, base - 0.375 * across], color, 0, **style)
 
-    def arrow(self, start: Point, end: Point, pen: float = BOLD, both: bool = False) -> None:
-        """A straight arrow, bold as of a movement or thin as of a length, with one head or both."""
-        scale = {THIN: 0.8, LINE: 1.0, BOLD: 1.4}[pen]
+    def arrow(self, start: Point, end: Point, pen: float = BOLD) -> None:
+        """A straight arrow, as of a movement."""
         step = np.subtract(end, start) / np.hypot(*np.subtract(end, start))
-        inset = 0.6 * scale * HEAD * step  # the line stops inside the heads
-        self.line([start + both * inset, end - inset], pen)
-        self.head(end, step, scale)
-        if both:
-            self.head(start, -step, scale)
+        self.line([start, end - 0.6 * HEADS[pen] * HEAD * step], pen)  # it stops inside the head
+        self.head(end, step, HEADS[pen])
 
-    def turn(
-        self, centre: Point, radius: float, start: float, end: float, pen: float = BOLD
-    ) -> None:
-        """An arc from one angle (degrees clockwise from the top) to another, with a head."""
-        scale, (start, end) = {THIN: 0.8, BOLD: 1.2}[pen], np.radians([start, end])
-        back = np.sign(end - start) * scale * HEAD / radius  # the angle that the head takes
+    def span(self, start: Point, end: Point, of: ArrayLike = (), pen: float = THIN) -> None:
+        """A straight arrow with two heads, as of a length, and thin lines from what it measures."""
+        for tip in (start, end):
+            self.arrow(np.add(start, end) / 2, tip, pen)
+        for tip, measured in zip((start, end), of, strict=False):
+            away = np.subtract(tip, measured)
+            self.line([measured, tip + 0.2 * away / np.hypot(*away)], THIN)
+
+    def turn(self, centre: Point, radius: float, angles: Point, pen: float = BOLD) -> None:
+        """An arc from one of two angles (rad clockwise from the top) to the other, with a head."""
+        start, end = angles
+        back = np.sign(end - start) * HEADS[pen] * HEAD / radius  # the angle that the head takes
         self.line(about(centre, radius, np.linspace(start, end - 0.6 * back, 60)), pen)
         step = about((0, 0), np.sign(back), end - back / 2 + np.pi / 2)
-        self.head(about(centre, radius, end), step, scale)
+        self.head(about(centre, radius, end), step, HEADS[pen])
 
     def write(
         self, text: str, x: float, y: float, ha: str = "center", to: Point = (), **style
@@ -120,7 +129,6 @@ class Sketch:
             middle = np.array([x + {"left": 1, "center": 0, "right": -1}[ha] * half[0], y])
             nearest = np.clip(to, middle - half - 0.1, middle + half + 0.1)
             self.line([nearest, to], THIN, style["color"])
-        style["multialignment"] = "left" if ha == "left" else "center"
         self.ax.text(x, y, text, ha=ha, linespacing=1.15, **style)
 
     def words(self, *notes: tuple) -> None:
@@ -140,6 +148,6 @@ class Sketch:
         """A cross at the spindle axis, the circle swept about it, a dot at the cutter's axis."""
         self.circle(spindle, swept, "none", THIN, linestyle=DASHED)
         self.line([spindle, cutter], BOLD, DISTURBED)
-        self.circle(cutter, 0.08, DISTURBED, 0)
+        self.dot(cutter, color=DISTURBED)
         for reach in ((0.17, 0.0), (0.0, 0.17)):
             self.line([np.subtract(spindle, reach), np.add(spindle, reach)])
