@@ -498,8 +498,8 @@ def test_with_runout_the_longest_tooth_leaves_one_wave_per_turn():
 
 def test_a_profile_longer_than_the_cutter_is_refused():
     _, ax = plt.subplots()
-    with pytest.raises(ValueError, match=r"radius 0.0047\d+ m .* draw fewer turns"):
-        pictures.draw_waviness(ax, HORNG1989, 0.0, turns=25)
+    with pytest.raises(ValueError, match=r"radius 0.0047\d+ m .* lengths are in metres"):
+        pictures.draw_waviness(ax, replace(HORNG1989, feed_speed=1.9), 0.0)
 
 
 # --- the face mill -------------------------------------------------------------------------------

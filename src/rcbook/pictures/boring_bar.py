@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from rcbook.machines import boring_bar, chatter
 from rcbook.machines.boring_bar import BoringBar
 from rcbook.pictures.blocks import Block, Wire, add_blocks, path
-from rcbook.pictures.results import MICRO, bare_polar, turn_of
-from rcbook.pictures.sketch import BOLD, FOCUS, LINE, PAPER, PLANT, STEEL, THIN, TOOL, Sketch, about
+from rcbook.pictures.results import MICRO, bare_polar
+from rcbook.pictures.sketch import BOLD, FOCUS, PLANT, STEEL, THIN, TOOL, Sketch, about, turn_of
 
 MACHINED = replace(boring_bar.HANSON_TSAO2000, amplitude=23e-6)  # section 5, machining
 
@@ -70,9 +70,9 @@ def _draw_side(sketch: Sketch) -> None:
     wall, grip = bored(0.0)[1] - LEVEL, JAWS - 0.1
     jaw = [(3.5, PIPE), (4.3, PIPE), (4.3, grip), (3.5, grip)]
     cut = [(EDGE, ROUGH), (EDGE, wall), (6.5, wall), (6.5, PIPE), (3.5, PIPE), (3.5, ROUGH)]
-    for shape, fill in ((jaw, PAPER), (cut, STEEL)):
-        for side in (1, -1):
-            sketch.area(np.array(shape) * (1, side) + (0, LEVEL), fill)
+    for side in (1, -1):
+        for shape, *fill in ((jaw,), (cut, STEEL)):
+            sketch.area(np.array(shape) * (1, side) + (0, LEVEL), *fill)
     sketch.box(EDGE - 0.2, LEVEL - ROD, 3.6, 2 * ROD, PLANT)
     for layer in range(6):
         sketch.box(EDGE - 0.05, LEVEL - 0.3 + layer / 10, 0.5, 0.1, FOCUS, THIN)
@@ -136,7 +136,7 @@ def draw_periodic_sampling(ax: Axes) -> Axes:
     sketch.words((r"$\omega_0$", LEFT - 0.3, MEAN, "right"), ("0", LEFT - 0.3, ZERO, "right"))
     axes = ("angle", ANGLES, r"$\theta$", ANGLES), ("time", TIMES, "$t$", TIMES)
     for word, y, symbol, height in (*axes, (r"speed $\omega$", MEAN + 0.6, "$t$", ZERO)):
-        sketch.arrow((LEFT - 0.25, height), (RIGHT + 0.55, height), LINE)
+        sketch.arrow((LEFT - 0.25, height), (RIGHT + 0.55, height), THIN)
         sketch.words((word, 0.1, y, "left"), (symbol, RIGHT + 0.75, height))
     return ax
 
@@ -160,7 +160,7 @@ def draw_bore(
     words = f"rings\n±{ring:g} µm" + (f"\nerror {magnified:g}×" if magnified != 1 else "")
     ax.text(0.5, 0.5, words, ha="center", va="center", transform=ax.transAxes)
     ax.set_theta_zero_location("N")
-    bare_polar(ax, {f"{90 * k}°": np.pi / 2 * k for k in range(4)}, [-ring, ring])
+    bare_polar(ax, dict(zip(("0°", "90°", "180°", "270°"), turn_of(4), strict=True)), [-ring, ring])
     ax.set_rlim(-reach, reach)
     ax.set_rorigin(-3 * reach)  # the bore itself is far larger
     return ax

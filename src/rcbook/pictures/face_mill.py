@@ -8,9 +8,8 @@ from matplotlib.patches import Circle, Polygon
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-from rcbook.machines import face_mill
-from rcbook.machines.face_mill import EIGHT_TEETH, FaceMill
-from rcbook.pictures.results import AXES, GREY, bare_polar, turn_of
+from rcbook.machines.face_mill import EIGHT_TEETH, FaceMill, Run
+from rcbook.pictures.results import AXES, GREY, bare_polar
 from rcbook.pictures.sketch import DISTURBED, FOCUS, PLANT, STEEL, THIN, TOOL, Sketch, about
 
 AXIS = (5.3, 4.2)  # of the spindle
@@ -119,7 +118,7 @@ def _draw_cutter(sketch: Sketch, cutter: Cutter) -> None:
     sketch.words((r"$\theta_i$", *about(AXIS, 0.8, STANDS / 2)), ("$F_t$", 8.30, 5.80))
 
 
-def draw_cut(axes: Sequence[Axes], run: face_mill.Run) -> None:
+def draw_cut(axes: Sequence[Axes], run: Run) -> None:
     """Plot force, torque, current and speed of a run over revolutions, each on an axes of its own.
 
     A thin line marks where the controller sets in.
@@ -140,7 +139,7 @@ def draw_teeth(
     Tooth 1 is at the top, the others follow anticlockwise.  Bars are broad and grey, or narrow and
     `outlined` to go over the broad ones.
     """
-    angle, turn = turn_of(len(values)), np.linspace(0, 2 * np.pi, 361)
+    angle, turn = np.arange(len(values)) / len(values) * 2 * np.pi, np.linspace(0, 2 * np.pi, 361)
     style = {"color": "0.80", "zorder": 2}
     if outlined:
         style = {"fill": False, "edgecolor": "black", "linewidth": 1.4, "zorder": 3}

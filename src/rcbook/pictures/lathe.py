@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from rcbook.machines.lathe import polygon_section
 from rcbook.pictures.blocks import Block, Node, Wire, add_blocks
 from rcbook.pictures.results import MILLI, bare_polar
-from rcbook.pictures.sketch import BOLD, FOCUS, PLANT, STEEL, THIN, TOOL, Sketch, about
+from rcbook.pictures.sketch import BOLD, FOCUS, PLANT, STEEL, THIN, TOOL, Sketch, about, turn_of
 
 CENTRE, INRADIUS = (3.1, 5.1), 1.3  # spindle axis, and half of the square's side
 BAR, CHUCK = 2.0, 2.55  # radii
@@ -51,7 +51,7 @@ def _draw_section(sketch: Sketch) -> None:
     sketch.chuck(CENTRE, CHUCK, np.radians(20.0))
     sketch.turn(CENTRE, CHUCK + 0.32, np.radians([-34.0, 28.0]))
     sketch.circle(CENTRE, BAR, PLANT)
-    sketch.area(outline(np.pi / 4 + np.pi / 2 * np.arange(4)), STEEL)
+    sketch.area(outline(np.pi / 4 + turn_of(4)), STEEL)
     sketch.reference([CENTRE, outline(0.0, CHUCK)])
     sketch.span(CENTRE, outline(np.pi))
     sketch.span(CENTRE, outline(TURNED), pen=BOLD)

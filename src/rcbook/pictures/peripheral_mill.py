@@ -91,18 +91,18 @@ def _draw_cutter(sketch: Sketch, mill: PeripheralMill) -> None:
     sketch.write("cutter axis,\noff by the runout", 6.4, 6.35, "left", axis, color=DISTURBED)
 
 
-def draw_waviness(ax: Axes, mill: PeripheralMill, eccentricity: float, turns: int = 3) -> Axes:
-    """Plot the profile, in mm and µm, that the teeth leave when the cutter is off by so many m.
+def draw_waviness(ax: Axes, mill: PeripheralMill, eccentricity: float) -> Axes:
+    """Plot three turns of the profile that the teeth leave when the cutter is off by so many m.
 
     Each tooth leaves an arc of its own radius, `radius + eccentricity cos(2 pi i / flutes)`, and
     the deepest arc remains.  Raises ValueError when the arcs are too short for the length drawn.
     """
-    radius, flutes = mill.cutter_diameter / 2, mill.flutes
+    radius, flutes, turns = mill.cutter_diameter / 2, mill.flutes, 3
     feed_per_turn = mill.feed_speed / mill.spindle_frequency
     if (turns + 1) * feed_per_turn >= radius - abs(eccentricity):
         raise ValueError(
             f"a cutter of radius {radius:g} m does not reach over {turns} turns of feed "
-            f"{feed_per_turn:g} m: draw fewer turns, or check that all lengths are in metres"
+            f"{feed_per_turn:g} m: check that all lengths are in metres"
         )
     x = np.linspace(0.0, turns * feed_per_turn, 80 * flutes * turns + 1)  # hits every crest
     tooth = np.arange(-flutes, (turns + 1) * flutes + 1)

@@ -41,11 +41,6 @@ def use_style() -> None:
     plt.style.use(resources.files("rcbook.pictures").joinpath("rcbook.mplstyle"))
 
 
-def turn_of(steps: int) -> np.ndarray:
-    """Angles in rad of so many equal steps of a turn, from 0."""
-    return 2 * np.pi * np.arange(steps) / steps
-
-
 def draw_signal(ax: Axes, run: Run, name: str = "output", label: str | None = None, **line) -> Axes:
     """One signal of a run against time in s; commands are drawn held, as a machine gets them."""
     held = {"drawstyle": "steps-post"} if name in ("command", "repetitive", "disturbance") else {}

@@ -43,6 +43,11 @@ def about(centre: ArrayLike, radius: ArrayLike, angle: ArrayLike) -> np.ndarray:
     return np.stack([radius * np.sin(angle), radius * np.cos(angle)], axis=-1) + centre
 
 
+def turn_of(steps: int) -> np.ndarray:
+    """Angles in rad of so many equal steps of a turn, from 0."""
+    return 2 * np.pi * np.arange(steps) / steps
+
+
 class Sketch:
     """Axes that show a box (left, bottom, right, top) in drawing units; `em` is the font size."""
 
@@ -139,7 +144,7 @@ class Sketch:
     def chuck(self, centre: Point, radius: float, turned: float) -> None:
         """A chuck along its axis with three jaws, one at an angle (rad) clockwise from the top."""
         self.circle(centre, radius)
-        for middle in turned + 2 * np.pi / 3 * np.arange(3):
+        for middle in turned + turn_of(3):
             outward, across = about((0, 0), radius, middle + np.array([0, np.pi / 2]))
             corners = np.array([(0.7, -0.15), (0.95, -0.15), (0.95, 0.15), (0.7, 0.15)])
             self.area(centre + corners @ [outward, across])
