@@ -628,7 +628,7 @@ def test_the_strip_joins_equal_steps_of_the_angle_to_the_instants_of_the_speed_l
 def test_the_chip_is_measured_at_the_edge_of_the_tool_from_one_surface_to_the_other():
     _, ax = rendered(pictures.draw_regeneration)
     tip = regeneration.TIP
-    low, high = float(regeneration.cut_surface(tip)), float(regeneration.last_surface(tip))
+    low, high = float(regeneration.surface(tip, 0)), float(regeneration.surface(tip, 1))
     label = places(ax)["$h(t)$"][0]
     ends = [y for x, y in heads(ax) if abs(x - label) < 0.8 and 1.5 < y < 4.0]
     assert sorted(ends) == pytest.approx([low, high])
@@ -639,17 +639,17 @@ def test_the_chip_is_measured_at_the_edge_of_the_tool_from_one_surface_to_the_ot
 def test_the_tool_always_cuts_and_has_just_the_marks_of_its_own_path_behind_it():
     _, ax = rendered(pictures.draw_regeneration)
     x = np.linspace(regeneration.LEFT, regeneration.RIGHT, 2000)
-    assert np.all(regeneration.last_surface(x) > regeneration.cut_surface(x))
+    assert np.all(regeneration.surface(x, 1) > regeneration.surface(x, 0))
     (tool,) = tools(ax)
     edge = np.linspace(tool[0], tool[-1], 50)[1:]  # its relief, from the tip
-    assert np.all(edge[:, 1] > regeneration.cut_surface(edge[:, 0]))
+    assert np.all(edge[:, 1] > regeneration.surface(edge[:, 0], 0))
 
 
 def test_the_drawn_lag_is_one_at_which_the_last_wave_feeds_the_vibration():
     """Work per cycle of the force K x(t - tau), which pushes the tool out of the cut."""
     cycle = np.linspace(0, regeneration.WAVE, 400, endpoint=False)
-    x = regeneration.cut_surface(regeneration.TIP - cycle)  # time goes on to the left
-    before = regeneration.last_surface(regeneration.TIP - cycle)
+    x = regeneration.surface(regeneration.TIP - cycle, 0)  # time goes on to the left
+    before = regeneration.surface(regeneration.TIP - cycle, 1)
     assert np.sum(before * np.gradient(x)) > 0
 
 

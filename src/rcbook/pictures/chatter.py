@@ -23,29 +23,23 @@ def draw_regeneration(ax: Axes) -> Axes:
     thickness = "chip thickness\n" + r"$h(t)=h_0+x(t-\tau)-x(t)$"
     sketch.words((thickness, 10.0, 7.2, "left"), (r"cutting force $K\,h(t)$", 10.0, 6.05, "left"))
     turn, old, cut = "left one turn ago,\n" + r"$x(t-\tau)$", TIP - 1.55 * WAVE, TIP + 2.3 * WAVE
-    sketch.write(turn, 0.5, 5.0, "left", (old, last_surface(old)), color=DISTURBED)
-    sketch.words(("being cut, $x(t)$", 11.4, 0.85, "left", (cut, cut_surface(cut))))
+    sketch.write(turn, 0.5, 5.0, "left", (old, surface(old, 1)), color=DISTURBED)
+    sketch.words(("being cut, $x(t)$", 11.4, 0.85, "left", (cut, surface(cut, 0))))
     sketch.words(("workpiece", 0.8, 0.85, "left"), ("chip", TIP + 3.7, CUT + 0.57))
     return ax
 
 
-def cut_surface(x: ArrayLike) -> np.ndarray:
-    """Height that the tool leaves, which rises now as it moves to the left."""
-    return CUT + CREST * np.cos(2 * np.pi * (np.asarray(x) - TIP) / WAVE + LAG)
-
-
-def last_surface(x: ArrayLike) -> np.ndarray:
-    """Height left one turn ago; the tool is at one of its crests."""
-    return CUT + CHIP + CREST * np.cos(2 * np.pi * (np.asarray(x) - TIP) / WAVE)
+def surface(x: ArrayLike, turns_ago: int) -> np.ndarray:
+    """Height left now (0), rising as the tool moves to the left, or a turn ago (1), at a crest."""
+    phase = 2 * np.pi * (np.asarray(x) - TIP) / WAVE + (1 - turns_ago) * LAG
+    return CUT + turns_ago * CHIP + CREST * np.cos(phase)
 
 
 def _draw_marks(sketch: Sketch) -> None:
     """Workpiece, both surfaces, the layer between them that is gone, its lengths, and the feed."""
     ahead, behind = np.linspace(LEFT, TIP, 400), np.linspace(TIP, RIGHT, 600)
-    old, cut, gone = (
-        np.column_stack([x, surface(x)])
-        for x, surface in ((ahead, last_surface), (behind, cut_surface), (behind, last_surface))
-    )
+    sides = (ahead, 1), (behind, 0), (behind, 1)
+    old, cut, gone = (np.column_stack([x, surface(x, turn)]) for x, turn in sides)
     sketch.area([*cut, *gone[::-1]], FOCUS, 0)
     sketch.area([(LEFT, BOTTOM), *old, *cut, (RIGHT, BOTTOM)], PLANT)
     sketch.line(old, BOLD, DISTURBED)
@@ -53,20 +47,20 @@ def _draw_marks(sketch: Sketch) -> None:
     sketch.line(cut, BOLD)
     sketch.arrow((3.4, 0.85), (5.3, 0.85))
 
-    low, high, at, mean = cut_surface(TIP), last_surface(TIP), TIP - 1.15, RIGHT + 0.15
+    low, high, at, mean = surface(TIP, 0), surface(TIP, 1), TIP - 1.15, RIGHT + 0.15
     sketch.span((at, low), (at, high), [(TIP, low), (TIP, high)])
     for height in (CUT, CUT + CHIP):
         sketch.reference([(TIP + 1.6, height), (RIGHT + 0.3, height)])
     sketch.span((mean, CUT), (mean, CUT + CHIP))
     old, cut = TIP + WAVE, TIP + WAVE * (1 - LAG / (2 * np.pi))
-    sketch.span((cut, 4.3), (old, 4.3), [(cut, cut_surface(cut)), (old, last_surface(old))])
+    sketch.span((cut, 4.3), (old, 4.3), [(cut, surface(cut, 0)), (old, surface(old, 1))])
     sketch.words(("phase shift", (old + cut) / 2 - 0.35, 4.78, "left"))
     sketch.words(("$h(t)$", TIP - 0.55, CUT + 0.72), ("$h_0$", RIGHT + 0.3, CUT + 0.575, "left"))
 
 
 def _draw_tool(sketch: Sketch) -> None:
     """Tool and mass on spring and damper, the frame that holds them, and the sense of x."""
-    (x, y), tip = MASS, cut_surface(TIP)
+    (x, y), tip = MASS, surface(TIP, 0)
     low, high = y - 0.575, y + 0.575
     sketch.area([(TIP, tip), (TIP + 0.1, low), (TIP + 1.1, low), (TIP + 0.95, tip + 0.75)], TOOL)
     sketch.box(x - 1.5, ROOF, 3.0, 0.35, hatch="////")
