@@ -15,9 +15,9 @@ import nbformat
 
 from rcbook import ledger
 from rcbook.book import pages
-from rcbook.book.execute import alternative
-from rcbook.book.project import Project
-from rcbook.book.run import Run, plain
+from rcbook.book.execute import alternative, plain
+from rcbook.book.project import Project, read_text
+from rcbook.book.run import Run
 from rcbook.ledger import show
 from rcbook.ledger.marks import without_marks
 
@@ -57,7 +57,7 @@ def fill(stage: Path, project: Project, run: Run) -> None:
     for name, notebook in run.notebooks.items():
         text = nbformat.writes(shown(notebook))
         (stage / "notebooks" / name).write_text(text, encoding="utf-8")
-    written = {page.name: page.read_text(encoding="utf-8") for page in project.book.glob("*.md")}
+    written = {page.name: read_text(page) for page in project.book.glob("*.md")}
     for name, text in (written | pages.pages(project.papers, run.rows)).items():
         (stage / name).write_text(without_marks(text), encoding="utf-8")
 
