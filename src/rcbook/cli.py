@@ -6,8 +6,9 @@ import argparse
 import signal
 import sys
 from collections.abc import Sequence
-from importlib import metadata
 from pathlib import Path
+
+from rcbook import __version__
 
 # What executes and renders is imported where it is used: `rcbook --help` must not wait for it.
 
@@ -39,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="rcbook", description=__doc__)
-    parser.add_argument("--version", action="version", version=metadata.version("rcbook"))
+    parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     build = commands.add_parser("build", help="execute, judge and render to book/_build/html")
     build.set_defaults(run=_build)
