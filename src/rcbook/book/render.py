@@ -14,7 +14,7 @@ from pathlib import Path
 import nbformat
 
 from rcbook import ledger
-from rcbook.book import pages
+from rcbook.book import house, pages
 from rcbook.book.execute import alternative, plain
 from rcbook.book.project import Project, read_text
 from rcbook.book.run import Run
@@ -61,7 +61,9 @@ def fill(stage: Path, project: Project, run: Run) -> None:
     written = {page.name: read_text(page) for page in project.book.glob("*.md")}
     made = pages.pages(project.papers, run.rows)
     made["cover.md"] = pages.cover(name, run.notebooks[name].cells[0].source, alternative(cell))
-    for name, text in (written | made).items():
+    for name, picture in house.pictures().items():
+        (stage / name).write_bytes(picture)
+    for name, text in (written | made | house.pages()).items():
         (stage / name).write_text(without_marks(text), encoding="utf-8")
 
 
