@@ -10,6 +10,7 @@ import ast
 import importlib
 import inspect
 import io
+import math
 import pkgutil
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -184,7 +185,9 @@ def _ordered(rows: list[list], routes: Sequence[Sequence]) -> dict:
         x |= _spread(row)
     for _ in range(8):
         for row in [*rows, *rows[::-1]]:
-            row.sort(key=lambda stop: (np.mean([x[n] for n in near[stop]] or [x[stop]]), str(stop)))
+            # fsum, since sets have no order and the same code must give the same picture
+            middle = {s: math.fsum(x[n] for n in near[s]) / max(len(near[s]), 1) for s in row}
+            row.sort(key=lambda stop: (middle[stop], str(stop)))
             x |= _spread(row)
     return x
 
@@ -245,7 +248,7 @@ def _png(draw: Callable[[Axes], Axes], size: tuple[float, float]) -> bytes:
     return file.getvalue()
 
 
-_PICTURES = {"floors": (draw_floors, (8.0, 6.6)), "way": (draw_way, (8.0, 9.0))}  # inches
+_PICTURES = {"floors": (draw_floors, (6.6, 6.6)), "way": (draw_way, (6.8, 9.0))}  # inches
 
 
 # ---- words ----
@@ -260,7 +263,7 @@ def pages() -> dict[str, str]:
 
 
 def _image(name: str, words: str) -> str:
-    return f"```{{image}} {name}.png\n:alt: {words}\n:width: 100%\n:align: center\n```\n"
+    return f"```{{image}} {name}.png\n:alt: {words}\n:width: 480px\n:align: center\n```\n"
 
 
 def floors_in_words() -> str:
@@ -287,17 +290,16 @@ def _rooms() -> str:
     lines = ["| room | what it is for | imports |", "|---|---|---|"]
     for room in (room for rooms in reversed(rcbook.FLOORS) for room in rooms if room in used):
         purpose = _first_sentence(importlib.import_module(f"rcbook.{room}"))
-        below = ", ".join(f"`{other}`" for other in sorted(used[room])) or "nothing"
-        lines.append(f"| `{room}` | {purpose} | {below} |")
+        lines.append(f"| {room} | {purpose} | {', '.join(sorted(used[room])) or 'nothing'} |")
     return "\n".join(lines) + "\n"
 
 
 def _stations() -> str:
     """The functions of the way as a table, each with a link to its description."""
-    lines = ["| station | function | what it does |", "|---|---|---|"]
+    lines = ["| function | what it does |", "|---|---|"]
     for station in (station for row in WAY for station in row):
         for name in station.names:
             found = resolve(name)
             link = f"{{py:obj}}`{_short(name)} <{found.__module__}.{found.__qualname__}>`"
-            lines.append(f"| {station.what} | {link} | {_first_sentence(found)} |")
+            lines.append(f"| {link} | *{station.what}*<br>{_first_sentence(found)} |")
     return "\n".join(lines) + "\n"
