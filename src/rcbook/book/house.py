@@ -116,11 +116,17 @@ def _imported(path: Path) -> set[str]:
 
 
 def resolve(name: str) -> object:
-    """The object behind the `module:name` of a station.  Raises ValueError when there is none."""
+    """The function or class behind the `module:name` of a station.
+
+    Raises ValueError when there is none.
+    """
     try:
-        return pkgutil.resolve_name(name)
+        found = pkgutil.resolve_name(name)
     except (ImportError, AttributeError, ValueError) as error:
         raise ValueError(f"{__file__}: WAY names {name}: {error}; mend it there") from None
+    if not callable(found):
+        raise ValueError(f"{__file__}: WAY names {name}, which is no function; mend it there")
+    return found
 
 
 def _first_sentence(item: object) -> str:
