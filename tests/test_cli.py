@@ -80,9 +80,21 @@ def test_a_ctrl_c_while_rendering_leaves_no_stage(at, capsys, monkeypatch):
 
 
 def test_no_ledger_yet(at, capsys):
-    at(one=[LEDGER])
+    made = at(one=[LEDGER])
     assert cli.main(["ledger"]) == 1
-    assert capsys.readouterr().err == "rcbook: there is no ledger yet; run `rcbook check` first\n"
+    said = f"rcbook: there is no {made.ledger_file} yet; run `rcbook check` first\n"
+    assert capsys.readouterr().err == said
+
+
+@pytest.mark.parametrize("content", [b"[", b"{}", b"\xff"])
+def test_a_ledger_that_cannot_be_read_is_named(at, capsys, content):
+    made = at(one=[LEDGER])
+    made.build.mkdir()
+    made.ledger_file.write_bytes(content)
+    assert cli.main(["ledger"]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith(f"rcbook: {made.ledger_file} ")
+    assert "Traceback" not in said
 
 
 def test_wrong_use_is_status_2(at, capsys):
@@ -166,3 +178,13 @@ def test_a_ledger_older_than_a_failed_run_says_so(at, capsys):
     capsys.readouterr()
     assert cli.main(["ledger"]) == 0
     assert not capsys.readouterr().err
+
+
+def test_a_ledger_older_than_a_run_that_could_not_begin_says_so(at, capsys):
+    made = at(one=[LEDGER])
+    assert cli.main(["check"]) == 0
+    (made.book / "references.bib").write_text("", encoding="utf-8")
+    assert cli.main(["check"]) == 1
+    assert "nothing was executed" in capsys.readouterr().err
+    assert cli.main(["ledger"]) == 0
+    assert "the last run failed; this is the ledger of an earlier one" in capsys.readouterr().err

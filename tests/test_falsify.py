@@ -208,7 +208,7 @@ def test_an_old_value_is_no_result_of_a_statement_that_failed(folder):
 @pytest.mark.parametrize("apply", ["raise SystemExit(0)", "import os; os._exit(0)"])
 def test_a_change_that_ends_the_program_is_refused(folder, apply):
     ends = paper(ends={"what": "w", "apply": apply})
-    with pytest.raises(ValueError, match=r"'ends' of fake does not run"):
+    with pytest.raises(ValueError, match=r"fake.toml: change 'ends' does not run"):
         falsify.trials(ends, folder, [("ends", None)])
 
 
@@ -218,3 +218,39 @@ def test_an_unknown_change_and_one_that_does_not_run_are_refused(folder):
     broken = paper(broken={"what": "w", "apply": "import nowhere"})
     with pytest.raises(ValueError, match=r"(?s)'broken'.*does not run.*nowhere"):
         falsify.trials(broken, folder, [("broken", None)])
+
+
+# ---- what the command prints ----
+
+
+def test_what_is_run_is_none_and_every_change_or_one_at_its_largest_or_every_size():
+    here = paper(grow=GROW, lost={"what": "w", "apply": ""})
+    assert falsify.wanted(here) == [("", None), ("grow", 0.04), ("lost", None)]
+    assert falsify.wanted(here, "grow", every=True) == [
+        ("grow", size) for size in (0.0001, 0.001, 0.04)
+    ]
+
+
+def test_trials_are_ordered_by_size_within_their_change():
+    sizes = [("b", 0.2), ("a", None), ("b", 0.1), ("b", 0.3)]
+    tried = falsify.by_size([Trial(name, size, {}, {}, ()) for name, size in sizes])
+    assert [trial.size for trial in tried["b"]] == [0.1, 0.2, 0.3]
+    assert [trial.size for trial in tried["a"]] == [None]
+
+
+def test_the_command_says_what_turned_and_what_did_not(folder, capsys):
+    here = named(paper(grow=GROW), area="grow", mad="grow", safe="grow")
+    assert not falsify.falsify([here], folder)
+    said = capsys.readouterr().out
+    assert "fake, no change: 0 verdicts turned: \n" in said
+    assert "fake, grow 0.04: 1 verdicts turned: fake.area\n    failed: " in said
+    assert "UNFLIPPED fake.safe: still reproduced under 'grow'\n" in said
+    assert said.splitlines()[-1] == "3 scored claims, 2 not shown to be falsifiable"
+
+
+def test_one_change_is_tried_on_the_papers_that_have_it(folder, capsys):
+    grown, other = paper(grow=GROW), replace(paper(), key="other")
+    assert falsify.falsify([other, grown], folder, change="grow")
+    assert "fake, grow 0.04: 1 verdicts turned" in capsys.readouterr().out
+    with pytest.raises(ValueError, match=r"no change 'shrink' in the data of other, fake"):
+        falsify.falsify([other, grown], folder, change="shrink")

@@ -333,7 +333,7 @@ def test_a_good_file_loads(folder):
 def test_a_bad_file_is_refused_with_a_reason(folder, old, new, message):
     assert old in GOOD
     folder(GOOD.replace(old, new, 1))
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises(ValueError, match=rf"paper\.toml.*{message}"):
         ledger.load("paper")
 
 
@@ -363,7 +363,7 @@ OWN = 'unit = ""\ntolerance = {}\ntolerance_reason = "no"'
 def test_a_malformed_file_is_a_value_error_naming_the_claim_or_file(folder, old, new):
     assert old in GOOD
     folder(GOOD.replace(old, new, 1))
-    with pytest.raises(ValueError, match="paper"):
+    with pytest.raises(ValueError, match=r"paper\.toml"):
         ledger.load("paper")
 
 

@@ -93,3 +93,10 @@ def test_odd_metadata_of_a_cell_are_no_alternative_text(sound, settings):
     notebook.cells[-1].metadata["mystnb"] = settings
     nbformat.write(notebook, sound.notebooks / "one.ipynb")
     assert not preflight.problems(sound)
+
+
+@pytest.mark.parametrize("name", ["_toc.yml", "references.bib", "index.md"])
+def test_a_text_that_is_no_utf8_is_named(sound, name):
+    (sound.book / name).write_bytes("Stabilit\xe4t".encode("latin-1"))
+    with pytest.raises(ValueError, match=rf"{name} is no UTF-8 text.*save it"):
+        preflight.problems(sound)

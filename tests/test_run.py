@@ -178,6 +178,8 @@ def test_the_executed_run_is_the_rendered_one(make):
     assert "The gain" in (project.html / "ledger.html").read_text(encoding="utf-8")
     assert "typographical" in (project.html / "errata.html").read_text(encoding="utf-8")
     assert (project.html / "_images" / "cover.png").is_file()
+    landing = (project.html / "index.html").read_text(encoding="utf-8")
+    assert 'alt="a curve"' in landing and "From the chapter" in landing
     assert first.is_file()
     assert not (project.html / "old").exists()
     assert sorted(path.name for path in project.build.iterdir()) == ["html", "ledger.json"]

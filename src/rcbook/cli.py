@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import json
 import signal
 import sys
 from collections.abc import Sequence
-from importlib import metadata
 from pathlib import Path
+
+from rcbook import __version__
 
 # What executes and renders is imported where it is used: `rcbook --help` must not wait for it.
 
@@ -40,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="rcbook", description=__doc__)
-    parser.add_argument("--version", action="version", version=metadata.version("rcbook"))
+    parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     build = commands.add_parser("build", help="execute, judge and render to book/_build/html")
     build.set_defaults(run=_build)
@@ -99,62 +99,25 @@ def _build(_) -> int:
 
 
 def _falsify(arguments: argparse.Namespace) -> int:
-    from rcbook import ledger
     from rcbook.book import falsify
     from rcbook.book.project import find
 
     if not _known(arguments.paper):
         return USAGE
     project = find(Path.cwd())
-    keys = (arguments.paper,) if arguments.paper else ledger.papers()
-    problems = shown = 0
-    for paper in map(ledger.load, keys):
-        names = [arguments.change] if arguments.change else list(paper.changes)
-        first = 0 if arguments.measure else -1  # all sizes, or the largest
-        wanted = [("", None)] if not arguments.change else []
-        for name in names:
-            wanted += [(name, size) for size in falsify.sizes(paper.changes.get(name, {}))[first:]]
-        tried = falsify.trials(paper, project.notebooks, wanted)
-        for trial in tried:
-            turned = [id for id, v in trial.verdicts.items() if v != paper.claims[id].expected]
-            head = f"{trial.change or 'no change'} {trial.size or ''}".strip()
-            print(f"{paper.key}, {head}: {len(turned)} verdicts turned: {', '.join(turned)}")
-            print("".join(f"    failed: {trouble}\n" for trouble in trial.troubles), end="")
-        if arguments.change:
-            continue
-        print(falsify.listing(paper, tried))
-        lacking = falsify.unflipped(paper, tried)
-        print("".join(f"UNFLIPPED {problem}\n" for problem in lacking), end="")
-        problems += len(lacking)
-        shown += sum(claim.scored for claim in paper.claims.values())
-        if arguments.measure and not lacking:
-            falsify.store(paper, falsify.margins(paper, tried))
-    print(f"{shown} scored claims, {problems} not shown to be falsifiable")
-    return FAILED if problems else OK
+    papers = [paper for paper in project.papers if arguments.paper in (None, paper.key)]
+    change, measure = arguments.change or "", arguments.measure
+    return OK if falsify.falsify(papers, project.notebooks, change, measure) else FAILED
 
 
 def _numbers(arguments: argparse.Namespace) -> int:
-    from rcbook.book import execute, numbers, run
+    from rcbook.book import numbers
     from rcbook.book.project import find
-    from rcbook.ledger import marks
 
     project = find(Path.cwd())
     if arguments.rewrite:
-        paths = sorted(project.notebooks.glob(arguments.file or "*.ipynb"))
-        if not paths:
-            raise ValueError(f"no notebook {arguments.file!r} in {project.notebooks}; name one")
-        _, failures, typed = execute.execute(paths)
-        for failure in failures:
-            print(f"{failure.notebook}, {failure.cell}: {run.plain(failure.what)}")
-        print(f"{numbers.rewrite(project, typed)} numbers rewritten")
-    places = [p for p in numbers.survey(project) if arguments.file in (None, p.file)]
-    if not places and arguments.file:
-        raise ValueError(f"no text of the book is called {arguments.file!r}; name a file of it")
-    lost = [place for place in places if place.number.kind == marks.UNACCOUNTED]
-    print("".join(f"UNACCOUNTED {place}\n" for place in lost), end="")
-    print(numbers.table(places))
-    print(f"\n{len(places)} numbers in the text, {len(lost)} unaccounted")
-    return FAILED if lost else OK
+        numbers.execute_and_rewrite(project, arguments.file)
+    return OK if numbers.report(project, arguments.file) else FAILED
 
 
 def _new(arguments: argparse.Namespace) -> int:
@@ -170,22 +133,19 @@ def _new(arguments: argparse.Namespace) -> int:
 
 def _ledger(arguments: argparse.Namespace) -> int:
     from rcbook import ledger
+    from rcbook.book import last
     from rcbook.book.project import find
 
     if not _known(arguments.paper):
         return USAGE
     project = find(Path.cwd())
-    file = project.ledger_file
+    rows = [row for row in last.read(project) if arguments.paper in (None, row["paper"])]
     if project.stale_mark.exists():
         print("rcbook: the last run failed; this is the ledger of an earlier one", file=sys.stderr)
-    if not file.is_file():
-        raise ValueError("there is no ledger yet; run `rcbook check` first")
-    rows = json.loads(file.read_text(encoding="utf-8"))
-    rows = [row for row in rows if arguments.paper in (None, row["paper"])]
     if arguments.json:
         sys.stdout.write(ledger.dumps(rows))
     else:
-        _print_table(rows)
+        last.print_table(rows)
     return OK
 
 
@@ -198,30 +158,6 @@ def _known(paper: str | None) -> bool:
         return True
     print(f"rcbook: no paper {paper!r}; choose one of {', '.join(known)}", file=sys.stderr)
     return False
-
-
-def _print_table(rows: Sequence[dict]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    from rcbook.ledger import show
-
-    table = Table(box=None, pad_edge=False)
-    table.add_column("claim", min_width=max((len(row["id"]) for row in rows), default=5))
-    for name in ("printed", "ours", "verdict", "reason"):
-        table.add_column(name, overflow="fold")
-    for row in rows:
-        flip = "" if row["verdict"] == row["expected_verdict"] else " (NOT EXPECTED)"
-        shown = (
-            show.printed(row),
-            show.value(row["computed"]),
-            row["verdict"] + flip,
-            row["reason"],
-        )
-        table.add_row(*(Text(cell) for cell in (row["id"], *shown)))  # brackets are no markup
-    Console(width=None if sys.stdout.isatty() else 160).print(table)
-    print(f"\n{show.counts(rows)}")
 
 
 if __name__ == "__main__":

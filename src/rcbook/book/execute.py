@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import re
 import sys
 import tempfile
 import time
@@ -26,6 +27,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rcbook.ledger import marks
 
 LIMIT = 900.0  # s per notebook; the slowest honest one needs about a sixth on two processors
+
+_ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 
 # What a user's own set-up could leak into a kernel, and so into the verdicts.
 _LEAKS = ("MPLBACKEND", "MPLSTYLE", "PYTHONSTARTUP", "PYTHONWARNINGS", "PYTHONPATH")
@@ -317,3 +320,8 @@ def _stderr(cell: nbformat.NotebookNode) -> str:
 def _say(progress: Progress, line: str) -> None:
     if progress.disable:  # not a terminal: no bars, so plain lines
         print(line, flush=True)
+
+
+def plain(text: str) -> str:
+    """`text`, without colours unless it goes to a terminal."""
+    return text if sys.stdout.isatty() else _ANSI.sub("", text)

@@ -48,25 +48,67 @@ def sizes(change: Mapping) -> list[float | None]:
     return sorted(change["sizes"]) if "sizes" in change else [None]
 
 
-def trials(
-    paper: Paper, notebooks: Path, wanted: Iterable[tuple[str, float | None]]
-) -> list[Trial]:
-    """Run the notebook of `paper` under each wanted (change, size), side by side.
+def falsify(
+    papers: Iterable[Paper], notebooks: Path, change: str = "", measure: bool = False
+) -> bool:
+    """Run notebooks under the changes of `papers`, print what turned, and say whether all is well.
+
+    All is well when every scored claim is shown to be falsifiable.  One `change` alone shows what
+    it turns and nothing more.  `measure` runs all sizes and stores the margins.
+    Raises ValueError for a change that no paper has, and for one that does not run.
+    """
+    papers = list(papers)
+    if change:
+        having = [paper for paper in papers if change in paper.changes]
+        if not having:
+            keys = ", ".join(paper.key for paper in papers)
+            raise ValueError(f"no change {change!r} in the data of {keys}; see [changes] there")
+        papers = having
+    problems = shown = 0
+    for paper in papers:
+        tried = trials(paper, notebooks, wanted(paper, change, measure))
+        for trial in tried:
+            print(_outcome(paper, trial))
+        if change:
+            continue
+        print(listing(paper, tried))
+        lacking = unflipped(paper, tried)
+        print("".join(f"UNFLIPPED {problem}\n" for problem in lacking), end="")
+        problems += len(lacking)
+        shown += sum(claim.scored for claim in paper.claims.values())
+        if measure and not lacking:
+            store(paper, margins(paper, tried))
+    print(f"{shown} scored claims, {problems} not shown to be falsifiable")
+    return not problems
+
+
+def wanted(paper: Paper, change: str = "", every: bool = False) -> list[tuple[str, float | None]]:
+    """What to run: all changes and none, or one; at the largest size, or at `every` size."""
+    names = [change] if change else list(paper.changes)
+    tries = [] if change else [("", None)]
+    for name in names:
+        tries += [(name, size) for size in sizes(paper.changes[name])[0 if every else -1 :]]
+    return tries
+
+
+def trials(paper: Paper, notebooks: Path, tries: Iterable[tuple[str, float | None]]) -> list[Trial]:
+    """Run the notebook of `paper` under each (change, size) of `tries`, side by side.
 
     The change `""` leaves the model as it is.
     Raises ValueError for a change that the paper does not have, and for one that does not run.
     """
-    wanted = list(wanted)
-    if unknown := sorted({name for name, _ in wanted} - paper.changes.keys() - {""}):
-        raise ValueError(f"{paper.key} has no change {', '.join(unknown)}; see [changes]")
+    tries = list(tries)
+    if unknown := sorted({name for name, _ in tries} - paper.changes.keys() - {""}):
+        raise ValueError(f"{paper.key}.toml has no change {', '.join(unknown)}; see [changes]")
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        return list(pool.map(lambda each: _trial(paper, notebooks, *each), wanted))
+        return list(pool.map(lambda each: _trial(paper, notebooks, *each), tries))
 
 
 def _trial(paper: Paper, notebooks: Path, name: str, size: float | None) -> Trial:
     from rcbook.book.execute import kernel_environment
 
     code = paper.changes[name]["apply"] if name else ""
+    who = f"{paper.key}.toml: change {name!r}" if name else f"{paper.notebook} without a change"
     with tempfile.TemporaryDirectory(prefix="rcbook-", ignore_cleanup_errors=True) as scratch:
         answer = Path(scratch) / "answer.json"  # a change may print what it likes
         job = json.dumps(
@@ -87,12 +129,10 @@ def _trial(paper: Paper, notebooks: Path, name: str, size: float | None) -> Tria
         try:
             done = subprocess.run(command, input=job, capture_output=True, **settings)
         except subprocess.TimeoutExpired:
-            raise ValueError(
-                f"change {name!r} of {paper.key} still runs after {LIMIT:g} s; make it smaller"
-            ) from None
+            raise ValueError(f"{who} still runs after {LIMIT:g} s; make it smaller") from None
         if done.returncode or not answer.is_file():
             why = done.stderr.strip().splitlines()[-1:] or ["it ended without an answer"]
-            raise ValueError(f"change {name!r} of {paper.key} does not run: {why[0]}")
+            raise ValueError(f"{who} does not run: {why[0]}")
         return Trial(name, size, **json.loads(answer.read_text(encoding="utf-8")))
 
 
@@ -117,13 +157,10 @@ def run_cells(notebook: Path, apply: str, size: float | None) -> dict:
                 troubles.append(f"{cell.id}: {type(error).__name__}: {error}")
                 _forget(statement, space)
         plt.close("all")
-    judged = {}
-    for item in space.values():
-        if isinstance(item, Ledger):
-            judged |= item.judgements
+    rows = [r for item in space.values() if isinstance(item, Ledger) for r in item.rows()]
     return {
-        "verdicts": {id: judgement.verdict for id, judgement in judged.items()},
-        "computed": {row["id"]: row["computed"] for row in _rows(space)},
+        "verdicts": {row["id"]: row["verdict"] for row in rows},
+        "computed": {row["id"]: row["computed"] for row in rows},
         "troubles": troubles,
     }
 
@@ -136,10 +173,26 @@ def _forget(statement: ast.stmt, space: dict) -> None:
             space.pop(node.id, None)
 
 
+def by_size(tried: Iterable[Trial]) -> dict[str, list[Trial]]:
+    """Trials by the name of their change, each list from the smallest size to the largest."""
+    found: dict[str, list[Trial]] = {}
+    for trial in sorted(tried, key=lambda trial: trial.size or 0.0):
+        found.setdefault(trial.change, []).append(trial)
+    return found
+
+
+def _outcome(paper: Paper, trial: Trial) -> str:
+    """Which verdicts one trial turned, and what failed in it."""
+    turned = [id for id, v in trial.verdicts.items() if v != paper.claims[id].expected]
+    head = f"{trial.change or 'no change'} {trial.size or ''}".strip()
+    line = f"{paper.key}, {head}: {len(turned)} verdicts turned: {', '.join(turned)}"
+    return "\n".join([line, *(f"    failed: {trouble}" for trouble in trial.troubles)])
+
+
 def listing(paper: Paper, tried: Sequence[Trial]) -> str:
     """A line for every scored claim that can be computed: its verdict, and what it turns to under
     which change."""
-    largest = {trial.change: trial for trial in sorted(tried, key=lambda t: t.size or 0.0)}
+    largest = {name: series[-1] for name, series in by_size(tried).items()}
     lines = []
     for claim in paper.claims.values():
         trial = largest.get(claim.flips_under)
@@ -151,19 +204,13 @@ def listing(paper: Paper, tried: Sequence[Trial]) -> str:
     return "\n".join(lines)
 
 
-def _rows(space: Mapping) -> Iterable[Mapping]:
-    for item in space.values():
-        if isinstance(item, Ledger):
-            yield from item.rows()
-
-
 def unflipped(paper: Paper, tried: Sequence[Trial]) -> list[str]:
     """Why the scored claims of `paper` are not all shown to be falsifiable; empty when they are.
 
     A claim is, when the change it names turns its verdict at the largest size tried.  Without a
     change, where that was tried, every verdict is the expected one.
     """
-    largest = {trial.change: trial for trial in sorted(tried, key=lambda t: t.size or 0.0)}
+    largest = {name: series[-1] for name, series in by_size(tried).items()}
     problems = []
     if plain := largest.get(""):
         problems += [f"{trouble} (without a change)" for trouble in plain.troubles]
@@ -192,9 +239,10 @@ def margins(paper: Paper, tried: Sequence[Trial]) -> dict[str, dict]:
     one at which it flipped, and for a number the size between at which it leaves its tolerance.
     """
     found: dict[str, dict] = {}
-    plain = next((trial for trial in tried if not trial.change), None)
+    series_of = by_size(tried)
+    plain = series_of.get("", [None])[0]
     for name, change in paper.changes.items():
-        series = sorted((t for t in tried if t.change == name and t.size), key=lambda t: t.size)
+        series = [trial for trial in series_of.get(name, ()) if trial.size]
         for claim in paper.claims.values():
             if not claim.scored or claim.expected == ledger.NOT_COMPUTABLE:
                 continue

@@ -6,10 +6,11 @@ import json
 import keyword
 import re
 import sys
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 
-from rcbook.book.project import Project, write
+from rcbook.book.project import Project, read_text, write
 
 _LAST = re.compile(r"(?:^ +- file: notebooks/.*\n)+", re.MULTILINE)
 
@@ -24,6 +25,23 @@ def create(project: Project, key: str, title: str = "") -> list[Path]:
     taken = keyword.iskeyword(key) or key in sys.stdlib_module_names
     if taken or not re.fullmatch(r"[a-z][a-z0-9_]*", key):
         raise ValueError(f"{key!r} is no key; use author and year, such as smith2001")
+    title = title or f"{key}: what it is about"
+    if title != json.dumps(title, ensure_ascii=False)[1:-1]:
+        raise ValueError(f"the title {title!r} holds quotes or breaks; leave them out")
+    texts = _skeletons(project, key, title)
+    if taken := [path for path in texts if path.exists()]:
+        raise ValueError(f"{taken[0]} exists already; choose another key or remove it")
+    contents, bibliography = project.book / "_toc.yml", project.book / "references.bib"
+    before = {path: read_text(path) for path in (contents, bibliography)}
+    entry = f"\n@misc{{{key},\n  author = {{Author, A.}},\n  title  = {{Title}},\n}}\n"
+    texts[contents] = _listed(before[contents], key)
+    texts[bibliography] = before[bibliography].rstrip("\n") + "\n" + entry
+    _write_all(texts, before)
+    return list(texts)
+
+
+def _skeletons(project: Project, key: str, title: str) -> dict[Path, str]:
+    """The texts of a new case study's files."""
     package = project.root / "src" / "rcbook"
     files = {
         package / "papers" / f"{key}.toml": "paper.toml",
@@ -31,23 +49,13 @@ def create(project: Project, key: str, title: str = "") -> list[Path]:
         project.notebooks / f"{key}.ipynb": "notebook.ipynb",
         project.root / "tests" / f"test_{key}.py": "test.py",
     }
-    if taken := [path for path in files if path.exists()]:
-        raise ValueError(f"{taken[0]} exists already; choose another key or remove it")
-    contents, bibliography = project.book / "_toc.yml", project.book / "references.bib"
-    listed = _listed(contents.read_text(encoding="utf-8"), key)
-    entry = f"\n@misc{{{key},\n  author = {{Author, A.}},\n  title  = {{Title}},\n}}\n"
-    title = title or f"{key}: what it is about"
-    if title != json.dumps(title, ensure_ascii=False)[1:-1]:
-        raise ValueError(f"the title {title!r} holds quotes or breaks; leave them out")
-    values = {
-        "@KEY@": key,
-        "@TITLE@": title,
-        "@CHAPTER@": str(max(paper.chapter for paper in project.papers) + 1),
-    }
-    texts = {path: _filled(name, values) for path, name in files.items()}
-    texts[contents] = listed
-    texts[bibliography] = bibliography.read_text(encoding="utf-8").rstrip("\n") + "\n" + entry
-    before = {path: path.read_text(encoding="utf-8") for path in texts if path.exists()}
+    chapter = max(paper.chapter for paper in project.papers) + 1
+    values = {"@KEY@": key, "@TITLE@": title, "@CHAPTER@": str(chapter)}
+    return {path: _filled(name, values) for path, name in files.items()}
+
+
+def _write_all(texts: Mapping[Path, str], before: Mapping[Path, str]) -> None:
+    """Write all `texts` or none; `before` is what files that exist held."""
     try:
         for path, text in texts.items():
             write(path, text)
@@ -58,7 +66,6 @@ def create(project: Project, key: str, title: str = "") -> list[Path]:
             else:
                 path.unlink(missing_ok=True)
         raise
-    return list(texts)
 
 
 def _listed(contents: str, key: str) -> str:

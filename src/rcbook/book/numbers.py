@@ -9,8 +9,8 @@ from functools import partial
 from pathlib import Path
 
 from rcbook import ledger
-from rcbook.book.execute import alternative, figure, read
-from rcbook.book.project import Project, write
+from rcbook.book.execute import alternative, execute, figure, plain, read
+from rcbook.book.project import Project, read_text, write
 from rcbook.ledger import marks, words
 
 ROUND = 30  # characters shown on either side of a number
@@ -29,6 +29,35 @@ class Place:
         return f"{self.file}, {self.at}: {self.number.text}   [{self.around}]"
 
 
+def report(project: Project, file: str | None = None) -> bool:
+    """Print what accounts for the numbers of the book or of one file, and say if nothing is left.
+
+    Raises ValueError for a file that is no text of the book, and as `survey` does.
+    """
+    places = [place for place in survey(project) if file in (None, place.file)]
+    if not places and file:
+        raise ValueError(f"no text of the book is called {file!r}; name a file of it")
+    lost = [place for place in places if place.number.kind == marks.UNACCOUNTED]
+    print("".join(f"UNACCOUNTED {place}\n" for place in lost), end="")
+    print(table(places))
+    print(f"\n{len(places)} numbers in the text, {len(lost)} unaccounted")
+    return not lost
+
+
+def execute_and_rewrite(project: Project, file: str | None = None) -> None:
+    """Execute all notebooks or one, and type what comes out into their texts.
+
+    Raises ValueError when there is no such notebook.
+    """
+    paths = sorted(project.notebooks.glob(file or "*.ipynb"))
+    if not paths:
+        raise ValueError(f"no notebook {file!r} in {project.notebooks}; name one")
+    _, failures, typed = execute(paths)
+    for failure in failures:
+        print(f"{failure.notebook}, {failure.cell}: {plain(failure.what)}")
+    print(f"{rewrite(project, typed)} numbers rewritten")
+
+
 def survey(project: Project) -> list[Place]:
     """Every number in notebooks, pages and data files of the book.
 
@@ -44,7 +73,7 @@ def of_texts(project: Project) -> list[Place]:
     for path in sorted(project.notebooks.glob("*.ipynb")):
         found += _read(path.name, _cells(path), partial(marks.numbers, printed=printed))
     for path in sorted(project.book.glob("*.md")):
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
         page = partial(marks.numbers, printed=printed, runs=False)
         found += _read(path.name, [("text", text)], page)
     return found

@@ -84,6 +84,23 @@ def _idea(paper: ledger.Paper) -> str:
     return f"| {chapter} | {loop} | {idea['index']} | {idea['period']} |\n"
 
 
+def cover(notebook: str, heading: str, alt: str) -> str:
+    """The cover of the book with the words of its cell and a link to its chapter."""
+    title = heading.partition("\n")[0].removeprefix("# ")
+    return (
+        f"```{{image}} cover.png\n:alt: {' '.join(alt.split())}\n:width: 100%\n:align: center\n"
+        f"```\n\n*From the chapter [{title}](notebooks/{notebook}).*\n"
+    )
+
+
+def chapters(papers: Sequence[ledger.Paper]) -> str:
+    """The papers as a list for the README: title with a link to the notebook, and citation."""
+    return "".join(
+        f"- [{paper.title}](notebooks/{paper.notebook}): {paper.citation.rstrip('.')}.\n"
+        for paper in papers
+    )
+
+
 def ledger_page(papers: Sequence[ledger.Paper], rows: Sequence[Mapping]) -> str:
     """Every claim with its verdict; one anchor per claim id, and a filter where scripts run."""
     by_key = {paper.key: paper for paper in papers}

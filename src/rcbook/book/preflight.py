@@ -11,7 +11,7 @@ import yaml
 
 from rcbook.book import numbers
 from rcbook.book.execute import read
-from rcbook.book.project import Project
+from rcbook.book.project import Project, read_text
 from rcbook.ledger import Paper
 
 _CITED = re.compile(r"\{cite(?::\w+)?\}`([^`]+)`")
@@ -54,7 +54,7 @@ def _cells(path: Path) -> list[nbformat.NotebookNode]:
 
 def _contents(project: Project) -> Iterable[str]:
     """Notebooks without a line in the table of contents, and lines without a file."""
-    text = (project.book / "_toc.yml").read_text(encoding="utf-8")
+    text = read_text(project.book / "_toc.yml")
     try:
         parts = yaml.safe_load(text)["parts"]
         chapters = [chapter for part in parts for chapter in part["chapters"]]
@@ -73,12 +73,12 @@ def _contents(project: Project) -> Iterable[str]:
 
 def _citations(project: Project) -> Iterable[str]:
     """Keys that are cited and not in the bibliography."""
-    known = set(_ENTRY.findall((project.book / "references.bib").read_text(encoding="utf-8")))
+    known = set(_ENTRY.findall(read_text(project.book / "references.bib")))
     texts = {f"{paper.key}.toml": f"{{cite}}`{paper.idea['cite']}`" for paper in project.papers}
     for path in project.notebooks.glob("*.ipynb"):
         texts[path.name] = "\n".join(cell.source for cell in _cells(path))
     for path in project.book.glob("*.md"):
-        texts[path.name] = path.read_text(encoding="utf-8")
+        texts[path.name] = read_text(path)
     for name, text in texts.items():
         cited = {key.strip() for keys in _CITED.findall(text) for key in keys.split(",")}
         for key in sorted(cited - known):

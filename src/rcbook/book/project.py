@@ -53,6 +53,14 @@ def find(start: Path) -> Project:
     raise ValueError(f"no checkout of rcbook at or above {start}; run this inside a clone")
 
 
+def read_text(path: Path) -> str:
+    """The text in `path`.  Raises ValueError, naming the file, when it is no UTF-8."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path} is no UTF-8 text ({error}); save it as UTF-8") from None
+
+
 def write(path: Path, text: str) -> None:
     """Put `text` into `path` whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)

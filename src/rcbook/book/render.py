@@ -14,10 +14,10 @@ from pathlib import Path
 import nbformat
 
 from rcbook import ledger
-from rcbook.book import pages
-from rcbook.book.execute import alternative
-from rcbook.book.project import Project
-from rcbook.book.run import Run, plain
+from rcbook.book import house, pages
+from rcbook.book.execute import alternative, plain
+from rcbook.book.project import Project, read_text
+from rcbook.book.run import Run
 from rcbook.ledger import show
 from rcbook.ledger.marks import without_marks
 
@@ -51,25 +51,35 @@ def fill(stage: Path, project: Project, run: Run) -> None:
     """Put everything the renderer reads into `stage`, an existing folder."""
     ignore = shutil.ignore_patterns("_build")
     shutil.copytree(project.book, stage, ignore=ignore, dirs_exist_ok=True)
-    (stage / "cover.png").write_bytes(cover(run.notebooks))
+    name, cell, png = cover(run.notebooks)
+    (stage / "cover.png").write_bytes(png)
     shutil.copy(mathjax(), stage / "assets")
     (stage / "notebooks").mkdir()
     for name, notebook in run.notebooks.items():
         text = nbformat.writes(shown(notebook))
         (stage / "notebooks" / name).write_text(text, encoding="utf-8")
-    written = {page.name: page.read_text(encoding="utf-8") for page in project.book.glob("*.md")}
-    for name, text in (written | pages.pages(project.papers, run.rows)).items():
+    written = {page.name: read_text(page) for page in project.book.glob("*.md")}
+    made = pages.pages(project.papers, run.rows)
+    made["cover.md"] = pages.cover(name, run.notebooks[name].cells[0].source, alternative(cell))
+    for name, picture in house.pictures().items():
+        (stage / name).write_bytes(picture)
+    for name, text in (written | made | house.pages()).items():
         (stage / name).write_text(without_marks(text), encoding="utf-8")
 
 
-def cover(notebooks: Mapping[str, nbformat.NotebookNode]) -> bytes:
-    """The PNG that the code cell tagged `cover` shows.  Raises RenderError when there is none."""
-    for notebook in notebooks.values():
+def cover(
+    notebooks: Mapping[str, nbformat.NotebookNode],
+) -> tuple[str, nbformat.NotebookNode, bytes]:
+    """The PNG that the code cell tagged `cover` shows, after its notebook's name and the cell.
+
+    Raises RenderError when there is none.
+    """
+    for name, notebook in notebooks.items():
         for cell in notebook.cells:
             if "cover" in cell.metadata.get("tags", ()):
                 for output in cell.get("outputs", ()):
                     if png := output.get("data", {}).get("image/png"):
-                        return base64.b64decode(png)
+                        return name, cell, base64.b64decode(png)
     raise RenderError("the book has no cover: tag a code cell that shows one PNG with `cover`")
 
 

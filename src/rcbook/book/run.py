@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -11,11 +9,9 @@ import nbformat
 
 from rcbook import ledger
 from rcbook.book import preflight
-from rcbook.book.execute import LIMIT, Failure, Typed, execute
+from rcbook.book.execute import LIMIT, Failure, Typed, execute, plain
 from rcbook.book.project import Project, write
 from rcbook.ledger import show
-
-_ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 
 
 @dataclass(frozen=True)
@@ -55,15 +51,22 @@ def check(project: Project, limit: float = LIMIT) -> Run:
     if not paths:
         raise ValueError(f"no notebook in {project.notebooks}; put one there")
     if found := preflight.problems(project):
+        _mark_stale(project)
         raise ValueError("nothing was executed, because\n  " + "\n  ".join(found))
     run = judge(project.papers, *execute(paths, limit))
     if run.complete:
         write(project.ledger_file, ledger.dumps(run.rows))
         project.stale_mark.unlink(missing_ok=True)
-    elif project.ledger_file.exists():
-        write(project.stale_mark, "A later run failed.\n")
+    else:
+        _mark_stale(project)
     report(run)
     return run
+
+
+def _mark_stale(project: Project) -> None:
+    """Say beside the ledger, if there is one, that a later run failed."""
+    if project.ledger_file.exists():
+        write(project.stale_mark, "A later run failed.\n")
 
 
 def check_paper(project: Project, paper: ledger.Paper, limit: float = LIMIT) -> Run:
@@ -138,8 +141,3 @@ def report(run: Run) -> None:
     wrong = sum(not number.right for number in typed)
     print(f"\n{len(typed)} numbers of the text computed, {wrong} of them wrong")
     print(f"{show.counts(run.rows)}; {len(run.missing)} never computed, {len(run.flips)} flipped")
-
-
-def plain(text: str) -> str:
-    """`text`, without colours unless it goes to a terminal."""
-    return text if sys.stdout.isatty() else _ANSI.sub("", text)

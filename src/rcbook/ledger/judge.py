@@ -119,13 +119,17 @@ def judge(claim: Claim, value: object = None, corrected: object = None, **eviden
         computed = {"holds": value, **mended, **evidence}
     known = {**evidence, "value": value, "printed": claim.printed}
     known |= {} if corrected is None else {"corrected": corrected}
+    return Judgement(claim, computed, verdict, _reason(claim, known), evidence)
+
+
+def _reason(claim: Claim, known: Mapping[str, object]) -> str:
+    """The claim's reason, with what is known in the place of its braces."""
     if absent := quotes(claim.reason) - known.keys():
         raise ValueError(f"{claim.id}: its reason quotes {sorted(absent)}; pass them as evidence")
     try:
-        reason = claim.reason.format(**known)
+        return claim.reason.format(**known)
     except (ValueError, TypeError) as error:
         raise ValueError(f"{claim.id}: its reason cannot be filled in: {error}") from None
-    return Judgement(claim, computed, verdict, reason, evidence)
 
 
 def _plain(claim: Claim, item: object) -> object:

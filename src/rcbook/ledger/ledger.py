@@ -47,7 +47,9 @@ class Ledger:
         Raises ValueError for an id the paper does not have.
         """
         if id not in self.paper.claims:
-            raise ValueError(f"{self.paper.key} has no claim {id!r}; see papers/*.toml")
+            raise ValueError(
+                f"{self.paper.key} has no claim {id!r}; see papers/{self.paper.key}.toml"
+            )
         self.judgements[id] = judge(self.paper.claims[id], value, corrected, **evidence)
         self._fresh[:] = [*(fresh for fresh in self._fresh if fresh != id), id]
         return self.judgements[id]

@@ -51,13 +51,10 @@ def load(key: str) -> Paper:
         raise ValueError(f"{key}.toml: unknown part {', '.join(sorted(unknown))}; remove it")
     _check_types(key, data)
     _check_tables(key, data)
-    claims: dict[str, Claim] = {}
-    for entry in data["claims"]:
-        claim = _claim(key, entry)
-        if claim.id in claims:
-            raise ValueError(f"{claim.id} stands twice in {key}.toml; remove one")
-        _validate(claim, data)
-        claims[claim.id] = claim
+    try:
+        claims = _claims(key, data)
+    except ValueError as error:
+        raise ValueError(f"{key}.toml, {error}") from None
     margins = resources.files("rcbook").joinpath("papers", f"{key}.margins.json")
     try:
         measured = json.loads(margins.read_text(encoding="utf-8")) if margins.is_file() else {}
@@ -139,10 +136,21 @@ def _parsed(file) -> dict:
         raise ValueError(f"{file.name}: {error}; mend it there") from None
 
 
+def _claims(key: str, data: Mapping) -> dict[str, Claim]:
+    claims: dict[str, Claim] = {}
+    for entry in data["claims"]:
+        claim = _claim(key, entry)
+        if claim.id in claims:
+            raise ValueError(f"{claim.id} stands twice; remove one")
+        _validate(claim, data)
+        claims[claim.id] = claim
+    return claims
+
+
 def _claim(paper: str, entry: Mapping) -> Claim:
     known = {f.name: f.default is MISSING for f in fields(Claim) if f.init and f.name != "paper"}
     known["role"] = True
-    name = entry.get("id", f"a claim of {paper} without id")
+    name = entry.get("id", "a claim without id")
     if unknown := entry.keys() - known:
         raise ValueError(f"{name}: unknown field {', '.join(sorted(unknown))}; remove it")
     if absent := [field for field, needed in known.items() if needed and field not in entry]:
