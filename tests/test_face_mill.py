@@ -16,9 +16,9 @@ from rcbook import zdomain
 from rcbook.loops import repetitive
 from rcbook.loops.repetitive import RepetitiveController
 from rcbook.machines import face_mill, spindle_drive
-from rcbook.machines.face_mill import EIGHT_TEETH, RANDOM_RUNOUT, RPM, Experiment
+from rcbook.machines.face_mill import RPM, TSAO_PONG1991, TSAO_PONG1991_RANDOM_RUNOUT, Experiment
 
-MILL = EIGHT_TEETH
+MILL = TSAO_PONG1991
 HEAVY = replace(MILL, depth=4.5e-3)
 SMOOTH = replace(MILL, runout=(0.0,) * 8)
 FAST = replace(MILL, speed=700 * RPM)
@@ -446,7 +446,7 @@ def chips_by_hand(run):
 @pytest.mark.parametrize("negative", [False, True])
 @pytest.mark.parametrize("entry", face_mill.ENTRIES)
 def test_forces_torque_and_teeth_without_a_chip_follow_from_the_clock(entry, negative):
-    mill = replace(PART, runout=RANDOM_RUNOUT)
+    mill = replace(PART, runout=TSAO_PONG1991_RANDOM_RUNOUT)
     run = face_mill.simulate(
         Experiment(mill, turns=3, substeps=4, entry=entry, keep_negative=negative)
     )
@@ -1081,8 +1081,8 @@ def test_eccentric_runout_is_the_chord_between_teeth_on_a_circle(teeth):
 
 
 def test_printed_runouts_sum_to_zero():
-    assert abs(sum(MILL.runout)) < 1e-20 and abs(sum(RANDOM_RUNOUT)) < 1e-20
-    assert replace(MILL, runout=RANDOM_RUNOUT).runout == RANDOM_RUNOUT
+    assert abs(sum(MILL.runout)) < 1e-20 and abs(sum(TSAO_PONG1991_RANDOM_RUNOUT)) < 1e-20
+    assert replace(MILL, runout=TSAO_PONG1991_RANDOM_RUNOUT).runout == TSAO_PONG1991_RANDOM_RUNOUT
 
 
 # ---- bad input ----

@@ -169,7 +169,7 @@ def test_a_new_module_is_found_without_being_listed(tmp_path, monkeypatch):
 
 
 def test_a_drawing_is_tried_with_every_parameter_set_of_its_machine(monkeypatch):
-    other = replace(face_mill.EIGHT_TEETH, feed_per_turn=0.4e-3)
+    other = replace(face_mill.TSAO_PONG1991, feed_per_turn=0.4e-3)
     monkeypatch.setattr(face_mill, "ANOTHER2030", other, raising=False)
     found = layouts.discover().keys() - LAYOUTS.keys()
     assert found == {"draw_angle_loop, ANOTHER2030", "draw_face_mill_setup, ANOTHER2030"}
@@ -392,7 +392,7 @@ def test_only_the_cut_closes_a_dashed_loop():
 @pytest.mark.parametrize(("samples", "step"), [(5, "9°"), (15, "3°")])
 def test_the_loop_holds_and_samples_at_the_step_of_the_machine(samples, step):
     _, ax = plt.subplots()
-    pictures.draw_angle_loop(ax, replace(face_mill.EIGHT_TEETH, samples_per_pitch=samples))
+    pictures.draw_angle_loop(ax, replace(face_mill.TSAO_PONG1991, samples_per_pitch=samples))
     assert [t for t in words(ax) if step in t] == [f"hold {step}", f"sampled\nevery {step}"]
 
 
@@ -552,7 +552,7 @@ def test_a_profile_longer_than_the_cutter_is_refused():
 
 # --- the face mill -------------------------------------------------------------------------------
 
-MILL = face_mill.EIGHT_TEETH
+MILL = face_mill.TSAO_PONG1991
 CUT = facing.Cutter(MILL)
 INSERTS = np.arange(1, 9)
 

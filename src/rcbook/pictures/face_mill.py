@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from scipy.interpolate import PchipInterpolator
 
-from rcbook.machines.face_mill import EIGHT_TEETH, FaceMill
+from rcbook.machines.face_mill import TSAO_PONG1991, FaceMill
 from rcbook.pictures.sketch import DISTURBED, FOCUS, PLANT, STEEL, THIN, TOOL, Sketch, about
 
 AXIS = (5.3, 4.2)  # of the spindle
@@ -19,7 +19,7 @@ INSERT = ((0.0, 0.0), (-0.08, -0.62), (-0.5, -0.58), (-0.42, -0.14))  # along, o
 BODY = np.radians([-2, 0, 6, 14, 22, 43]), (2.3, 1.85, 1.8, 1.95, 2.3, 2.3)  # from insert to insert
 
 
-def draw_face_mill_setup(ax: Axes, mill: FaceMill = EIGHT_TEETH) -> Axes:
+def draw_face_mill_setup(ax: Axes, mill: FaceMill = TSAO_PONG1991) -> Axes:
     """Draw face milling of a full slot along the spindle axis: inserts, chips, runout and force.
 
     A tooth enters the workpiece at the top, at 0 degrees, and leaves at the bottom.  Made for a
