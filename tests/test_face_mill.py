@@ -506,6 +506,26 @@ def test_the_controller_sees_the_record_and_answers_by_its_recursion(measure, ou
     assert np.ptp(run.command[:first]) == 0 < np.ptp(run.command[first:])
 
 
+def test_a_plant_a_repetitive_controller_and_a_pair_of_polynomials_control_alike():
+    """The protocol asks for two polynomials and for nothing else."""
+    law = face_mill.control_model(MILL)
+    plant = replace(law, b=1e-6 * law.b)
+    for controller in (plant, FORCE):
+        pair = SimpleNamespace(
+            numerator=controller.numerator.tolist(), denominator=list(controller.denominator)
+        )
+        one = Experiment(MILL, controller, engaged=1, controlled=2, turns=3, substeps=2)
+        run, same = face_mill.simulate_all([one, replace(one, controller=pair)])
+        assert np.ptp(run.command) > 0
+        np.testing.assert_array_equal(run.speed, same.speed)
+
+
+@pytest.mark.parametrize("controller", [1.0, SimpleNamespace(numerator=[1.0])])
+def test_what_is_no_controller_is_refused_at_the_door(controller):
+    with pytest.raises(TypeError, match=r"controller .* has no .*such as a zdomain\.Plant"):
+        Experiment(MILL, controller)
+
+
 def test_control_later_than_the_end_changes_nothing():
     idle = face_mill.simulate(Experiment(MILL, turns=3))
     late = face_mill.simulate(Experiment(MILL, FORCE, controlled=9, turns=3))

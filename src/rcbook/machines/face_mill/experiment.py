@@ -20,7 +20,17 @@ from rcbook.zdomain import whole_number
 
 
 class Controller(Protocol):
-    """A sampled controller: causal numerator and denominator, polynomials in z^-1."""
+    """What may control an experiment: any object with a causal `numerator` and `denominator`.
+
+    Both are 1-D arrays or sequences of real coefficients in z^-1, lowest power first, and the first
+    of the denominator is not zero.  Once per sample, every `sampling_angle`, it is given the
+    nominal value minus the measured one, in N (or N m), and answers with what is added to the
+    speed command, in V.  A `rcbook.loops.repetitive.RepetitiveController` is one, a
+    `rcbook.zdomain.Plant` is one, and so is a name for two polynomials::
+
+        leak = Plant(b=[-1e-4], a=[1, -0.9], delay=1, dt=sampling_angle(mill))
+        run = simulate(Experiment(mill, controller=leak))
+    """
 
     @property
     def numerator(self) -> np.ndarray: ...
@@ -41,7 +51,8 @@ class Experiment:
     one".  `torque` computes the load with the memory of eq. 8 or from the speed of the instant.
     `keep_negative` lets a chip thickness below zero push.  The current limit acts on the current
     command, with the velocity integral running on ("clamp") or stopped ("hold") meanwhile.
-    Raises ValueError for another word than these and numbers that are no whole ones.
+    Raises ValueError for another word than these and numbers that are no whole ones, and TypeError
+    for a controller that is no `Controller`.
     """
 
     mill: FaceMill
@@ -69,6 +80,12 @@ class Experiment:
             ("limit", LIMITS),
         ):
             one_of(getattr(self, name), allowed, name)
+        for name in ("numerator", "denominator"):
+            if self.controller is not None and not hasattr(self.controller, name):
+                raise TypeError(
+                    f"controller {self.controller!r} has no {name}; give an object with numerator "
+                    "and denominator in z^-1, such as a zdomain.Plant"
+                )
 
     @property
     def steps_per_turn(self) -> int:
