@@ -516,6 +516,89 @@ def test_outcome_needs_turns_before_and_after(engaged, controlled, turns):
         face_mill.outcome(replace(run, experiment=one))
 
 
+@pytest.mark.parametrize("output", face_mill.OUTPUTS)
+def test_evenness_is_the_spread_before_and_after_control(output):
+    run = face_mill.simulate(Experiment(MILL, FORCE, controlled=3, turns=5, substeps=2))
+    record, pick = {"force": (run.force, np.max), "torque": (run.torque, np.mean)}[output]
+    spread = {}
+    for turn in (2, 5):
+        pitches = np.split(record[run.during(turn)], 8)
+        spread[turn] = np.ptp([pick(pitch) for pitch in pitches])
+    found = face_mill.evenness(run, output)
+    assert (found["before"], found["after"]) == (spread[2], spread[5])
+    assert found["share"] == pytest.approx(100 * spread[5] / spread[2], rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    "share, turns", [(1.0, 0), (0.49, 2), (0.1, 4), (0.05, 5), (0.02, 6), (0.001, 7)]
+)
+def test_turns_until_a_share_is_left_counts_to_the_last_turn_above_it(share, turns):
+    run = with_spreads([0, 9, 10, 5, 4.9, 0.9, 1.1, 0.9, 0.5, 0.1])
+    assert face_mill.turns_until(run, share) == turns
+
+
+def revolutions(run, spread):
+    """Tooth by tooth: how far one must go until every turn behind is even enough."""
+    peaks = face_mill.pitch_peaks(run)[run.experiment.controlled - 1 :].ravel()
+    for first in range(peaks.size - 7):
+        behind = range(first, peaks.size - 7)
+        if all(max(peaks[k : k + 8]) - min(peaks[k : k + 8]) <= spread for k in behind):
+            return first / 8
+    return np.inf
+
+
+def test_revolutions_until_even_enough_are_counted_by_teeth():
+    run = face_mill.simulate(Experiment(MILL, FORCE, controlled=3, turns=8, substeps=2))
+    found = {s: face_mill.revolutions_until(run, s) for s in (100, 10, 5, 1, 0.5, 1e-6)}
+    assert found == {s: revolutions(run, s) for s in found}
+    assert found[100] == 0 and found[1e-6] == np.inf and 0 < found[10] < found[1] < 6
+
+
+def test_a_summary_has_the_numbers_of_the_last_turn():
+    run = face_mill.simulate(Experiment(MILL, FORCE, turns=10, substeps=2))
+    row = face_mill.summary(run)
+    assert row["outcome"] == face_mill.outcome(run)
+    assert row["to (A)"] - row["current from (A)"] == 2 * face_mill.current_swing(run)
+    assert row["to (rpm)"] == run.speed[-80:].max() * 60 / (2 * np.pi)
+    assert list(row)[1:5] == [
+        "peaks before (N)",
+        "at the end (N)",
+        "torque before (N m)",
+        "at the end (N m)",
+    ]
+
+
+# ---- searches ----
+
+
+def test_the_largest_stable_depth_lies_between_a_stable_and_an_unstable_cut():
+    """Drive and cut alone; with a loop that has roots outside from 2 mm on, it ends there."""
+    deepest = face_mill.largest_stable_depth(MILL, "instantaneous")
+    for depth, stable in ((deepest, True), (deepest + 1e-6, False)):
+        assert face_mill.is_stable(replace(MILL, depth=depth), "instantaneous") is stable
+    found = face_mill.largest_stable_depth(
+        MILL, "instantaneous", lambda mill: 2 * (mill.depth > 2e-3)
+    )
+    assert 2e-3 - 1e-6 < found <= 2e-3
+    with pytest.raises(ValueError, match="does not hold at inside"):
+        face_mill.largest_stable_depth(MILL, roots_outside=lambda _: 2)
+
+
+def test_the_onset_of_the_limit_is_where_the_current_begins_to_be_cut_off():
+    """Controlled at rising speeds; the flag of the limit tells the two sides apart."""
+
+    def at(rpm, limit=50.0):
+        drive = replace(MILL.drive, current_limit=limit)
+        mill = replace(MILL, drive=drive, speed=rpm * RPM)
+        return Experiment(mill, repetitive_controller(mill), turns=16, substeps=4, inner=8)
+
+    onset = face_mill.onset_of_limit(at, 500.0, 510.0, 550.0, 0.05)
+    for rpm, cut_off in ((onset - 5, False), (onset + 5, True)):
+        run = face_mill.simulate(at(rpm))
+        assert run.saturated[run.during(-1)].any() == cut_off
+    assert face_mill.onset_of_limit(lambda rpm: at(rpm, 1e3), 500.0, 510.0, 550.0, 1) == np.inf
+
+
 # ---- closed forms ----
 
 

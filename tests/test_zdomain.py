@@ -1,5 +1,7 @@
 """Zero-phase inverse, zero split, zero-order hold and Q filters against other algorithms."""
 
+import math
+
 import control
 import numpy as np
 import pytest
@@ -553,3 +555,28 @@ def test_turns_round_the_origin_refuses_a_curve_through_it():
         zdomain.turns_round_origin(lambda x: x - 0.3 + 0j, 0.0, 1.0, 7)
     with pytest.raises(ValueError, match="NaN or infinity"):
         zdomain.turns_round_origin(lambda x: np.full(x.size, np.nan), 0.0, 1.0, 7)
+
+
+# ---- where something stops being true ----
+
+
+@pytest.mark.parametrize("inside, outside", [(0.0, 3.0), (2.0, -3.0), (1.0, 9e3)])
+@pytest.mark.parametrize("precision", [0.1, 1e-9])
+def test_the_boundary_is_a_root_from_the_inside(inside, outside, precision):
+    """x^2 < 2 ends at +-sqrt 2; what is found holds, and a step of the precision farther not."""
+    inside = min(inside, 1.0)
+    found = zdomain.boundary(lambda x: x * x < 2, inside, outside, precision)
+    further = found + math.copysign(precision, outside - inside)
+    assert found * found < 2 <= further * further
+
+
+def test_the_boundary_is_no_farther_than_asked_and_begins_where_it_holds():
+    assert zdomain.boundary(lambda x: True, 1.0, 1.0, 1e-3) == 1.0
+    assert 2 - 1e-3 <= zdomain.boundary(lambda x: True, 1.0, 2.0, 1e-3) < 2
+    with pytest.raises(ValueError, match=r"does not hold at inside = 3\.0; begin where"):
+        zdomain.boundary(lambda x: x < 2, 3.0, 9.0, 1e-3)
+    for bad in (np.nan, np.inf):
+        with pytest.raises(ValueError, match="inside = "):
+            zdomain.boundary(lambda x: True, bad, 1.0, 1e-3)
+    with pytest.raises(ValueError, match=r"precision = 0\.0"):
+        zdomain.boundary(lambda x: x < 2, 1.0, 9.0, 0.0)

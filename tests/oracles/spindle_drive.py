@@ -1,6 +1,7 @@
 """The spindle drive by its block diagram, worked out by hand."""
 
 import numpy as np
+import scipy.integrate
 
 
 def currents_and_speeds(d, s, velocity_loop=True, slope=0.0):
@@ -67,3 +68,30 @@ def equilibrium(d, speed, torque):
         voltage / (d.loop_gain * d.current_integral),
         d.current_feedback * current,
     ]
+
+
+def turned(d, u, angle, start):
+    """States after the shaft turned by an angle in rad, from its equations and an adaptive method.
+
+    u holds speed command and torque.
+    """
+
+    def rates(_, state):
+        speed, current, tachometer, current_integral, velocity_integral = state
+        missing = d.velocity_gain * (u[0] - tachometer) + velocity_integral
+        missing -= d.current_feedback * current
+        voltage = d.loop_gain * (d.current_gain * missing + d.current_integral * current_integral)
+        by_time = [
+            (d.torque_constant * current - d.friction * speed - u[1]) / d.inertia,
+            (voltage - d.resistance * current - d.back_emf * speed) / d.inductance,
+            (d.tacho_gain * speed - tachometer) / d.tacho_lag,
+            missing,
+            d.velocity_integral * (u[0] - tachometer),
+        ]
+        return np.array(by_time) / speed
+
+    scale = np.abs(start) + 1e-3
+    done = scipy.integrate.solve_ivp(
+        rates, (0, angle), start, method="LSODA", rtol=1e-11, atol=1e-11 * scale
+    )
+    return done.y[:, -1]

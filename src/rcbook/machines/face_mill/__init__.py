@@ -9,12 +9,16 @@ from rcbook.machines.face_mill.measures import (
     GROWTH,
     current_swing,
     current_swings,
+    evenness,
     outcome,
     peak_spreads,
     pitch_peaks,
     pitch_torques,
+    revolutions_until,
+    summary,
     tooth_forces,
     torque_spreads,
+    turns_until,
 )
 from rcbook.machines.face_mill.mill import (
     RPM,
@@ -33,4 +37,5 @@ from rcbook.machines.face_mill.readings import (
     OUTPUTS,
     TORQUES,
 )
+from rcbook.machines.face_mill.searches import largest_stable_depth, onset_of_limit
 from rcbook.machines.face_mill.simulation import Run, simulate, simulate_all

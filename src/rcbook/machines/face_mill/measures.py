@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from rcbook.machines.face_mill.cut import cut_of
+from rcbook.machines.face_mill.mill import RPM
+from rcbook.machines.face_mill.readings import OUTPUTS, one_of
 from rcbook.machines.face_mill.simulation import Run
 
 GROWTH = 1.01  # beyond which neither rounding nor convergence decides
@@ -57,6 +59,62 @@ def current_swing(run: Run, turn: int = -1) -> float:
     """Half the range of the current in A within a turn counted as in `Run.during`."""
     run.during(turn)
     return float(current_swings(run)[turn - 1 if turn > 0 else turn])
+
+
+def evenness(run: Run, output: str = "force") -> dict[str, float]:
+    """Spread `before` control, `after` it in the last turn (N or N m), and the `share` in percent.
+
+    Spreads are those of the peaks per tooth pitch, or of the mean torques.
+    Raises ValueError for another output than force or torque.
+    """
+    one_of(output, OUTPUTS, "output")
+    spreads = peak_spreads(run) if output == "force" else torque_spreads(run)
+    before, after = spreads[run.experiment.controlled - 2], spreads[-1]
+    return {"before": before, "after": after, "share": 100 * after / before}
+
+
+def turns_until(run: Run, share: float) -> int:
+    """Turns of control after which the spread of the peaks stays within a share of that before.
+
+    All turns of control when it does not.
+    """
+    spreads, controlled = peak_spreads(run), run.experiment.controlled
+    over = np.flatnonzero(~(spreads[controlled - 1 :] / spreads[controlled - 2] <= share))
+    return int(over[-1]) + 1 if over.size else 0
+
+
+def revolutions_until(run: Run, spread: float) -> float:
+    """Revolutions of control after which any turn's peaks spread by at most `spread` N for good.
+
+    A turn may begin with any tooth; infinite when the run ends above it.
+    """
+    teeth = run.experiment.mill.teeth
+    peaks = pitch_peaks(run)[run.experiment.controlled - 1 :].ravel()
+    turns = np.ptp(np.lib.stride_tricks.sliding_window_view(peaks, teeth), axis=1)
+    over = np.flatnonzero(~(turns <= spread))
+    if over.size and over[-1] == turns.size - 1:
+        return np.inf
+    return float((over[-1] + 1) / teeth) if over.size else 0.0
+
+
+def summary(run: Run) -> dict[str, str | float]:
+    """A controlled run as the row of a table: outcome, spreads, range of current and speed.
+
+    Spreads are those before control and in the last turn, ranges those of the last turn.
+    """
+    last, force, torque = run.during(-1), evenness(run), evenness(run, "torque")
+    speed = run.speed[last] / RPM
+    return {
+        "outcome": outcome(run),
+        "peaks before (N)": force["before"],
+        "at the end (N)": force["after"],
+        "torque before (N m)": torque["before"],
+        "at the end (N m)": torque["after"],
+        "current from (A)": run.lowest_current[last].min(),
+        "to (A)": run.highest_current[last].max(),
+        "speed from (rpm)": speed.min(),
+        "to (rpm)": speed.max(),
+    }
 
 
 def outcome(run: Run) -> str:
