@@ -855,3 +855,27 @@ def test_the_first_four_curves_stand_out_from_white_paper():
 def test_fonts_are_those_that_ship_with_matplotlib():
     assert plt.rcParams["font.sans-serif"] == ["DejaVu Sans"]
     assert plt.rcParams["mathtext.fontset"] == "dejavusans"
+
+
+# --- runs side by side, and tables ---------------------------------------------------------------
+
+
+def test_cuts_stand_side_by_side_under_their_names():
+    runs = [face_mill.simulate(face_mill.Experiment(MILL, turns=n, substeps=1)) for n in (1, 2)]
+    _, axes = plt.subplots(4, 2)
+    pictures.draw_cuts(axes, {"one": runs[0], "two": runs[1]})
+    where = plt.rcParams["axes.titlelocation"]
+    assert [ax.get_title(where) for ax in axes[0]] == ["one", "two"]
+    for column, run in zip(axes.T, runs, strict=True):
+        np.testing.assert_array_equal(column[2].lines[0].get_ydata(), run.current)
+    assert axes[0, 0].get_ylabel() and not axes[0, 1].get_ylabel()
+    with pytest.raises(ValueError, match="shorter"):
+        pictures.draw_cuts(axes, {"one": runs[0]})
+    plt.close("all")
+
+
+def test_a_table_has_a_row_for_each_name_and_dashes():
+    html = pictures.table({"a": {"x": 1.25, "y": None}, "b": {"x": 2.0, "y": "word"}}, 2).to_html()
+    assert [cell in html for cell in (">1.25<", ">–<", ">2.00<", ">word<", ">a<", ">y<")] == [
+        True
+    ] * 6

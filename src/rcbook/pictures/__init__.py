@@ -24,6 +24,7 @@ from rcbook.pictures.results import (
     draw_band,
     draw_bore,
     draw_cut,
+    draw_cuts,
     draw_cutter_chips,
     draw_locus,
     draw_poles_zeros,
@@ -34,6 +35,7 @@ from rcbook.pictures.results import (
     draw_unit_disc,
     draw_waviness,
     mark_revolutions,
+    table,
     use_style,
 )
 from rcbook.pictures.sketch import Sketch

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
+from pandas.io.formats.style import Styler
 
 from rcbook.loops.repetitive import Run
 from rcbook.machines import face_mill
@@ -68,6 +70,23 @@ def draw_cut(axes: Sequence[Axes], run: face_mill.Run, label: str | None = None,
         ax.set_ylabel(name)
         ax.margins(x=0)
     axes[-1].set_xlabel("revolutions of the cutter")
+
+
+def draw_cuts(axes: np.ndarray, runs: Mapping[str, face_mill.Run]) -> None:
+    """Milling runs side by side, each as `draw_cut` has it on a column of four axes under its name.
+
+    Raises ValueError when there is not a column for each run.
+    """
+    for column, (name, run) in zip(axes.T, runs.items(), strict=True):
+        draw_cut(column, run)
+        column[0].set_title(name)
+    for ax in axes[:, 1:].ravel():
+        ax.set_ylabel("")
+
+
+def table(rows: Mapping[str, Mapping], decimals: int = 1) -> Styler:
+    """Named rows as a table with so many decimals, and a dash for what does not exist."""
+    return pd.DataFrame(rows).T.style.format(precision=decimals, na_rep="–")
 
 
 def draw_waviness(ax: Axes, mill: PeripheralMill, eccentricity: float, turns: int = 3) -> Axes:

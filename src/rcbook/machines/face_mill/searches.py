@@ -25,8 +25,8 @@ def largest_stable_depth(
     """Largest depth in m, from that of the mill on, at which drive, cut and loop are stable.
 
     `roots_outside` counts the roots outside of the unit circle that the loop round a mill has;
-    without it drive and cut stand alone.  `torque` is that of `is_stable`.
-    Raises ValueError when the mill itself is unstable.
+    without it drive and cut stand alone.  `torque` is that of `is_stable`.  Zero when already the
+    mill as it stands is unstable.
     """
 
     def stable(depth: float) -> bool:
@@ -34,6 +34,8 @@ def largest_stable_depth(
         alone = is_stable(deeper, torque)
         return alone and (roots_outside is None or not roots_outside(deeper))
 
+    if not stable(mill.depth):
+        return 0.0
     return zdomain.boundary(stable, mill.depth, deepest, precision)
 
 
