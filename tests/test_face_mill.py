@@ -525,8 +525,8 @@ def test_evenness_is_the_spread_before_and_after_control(output):
         pitches = np.split(record[run.during(turn)], 8)
         spread[turn] = np.ptp([pick(pitch) for pitch in pitches])
     found = face_mill.evenness(run, output)
-    assert (found["before"], found["after"]) == (spread[2], spread[5])
-    assert found["share"] == pytest.approx(100 * spread[5] / spread[2], rel=1e-15)
+    assert found == (spread[2], spread[5])
+    assert found.left == spread[5] / spread[2]
 
 
 @pytest.mark.parametrize(
@@ -596,6 +596,18 @@ def test_the_onset_of_the_limit_is_where_the_current_begins_to_be_cut_off():
         run = face_mill.simulate(at(rpm))
         assert run.saturated[run.during(-1)].any() == cut_off
     assert face_mill.onset_of_limit(lambda rpm: at(rpm, 1e3), 500.0, 510.0, 550.0, 1) == np.inf
+
+
+def test_step_errors_are_the_differences_from_the_finest_run_at_the_samples():
+    one = Experiment(MILL, turns=3)
+    errors = face_mill.step_errors(one, (2, 4, 12), 24)
+    finest, coarse = (face_mill.simulate(replace(one, substeps=n, inner=24 // n)) for n in (12, 2))
+    by_hand = max(abs(coarse.current[2 * k] - finest.current[12 * k]) for k in range(121))
+    assert errors["current"][0] == by_hand
+    swings = [face_mill.current_swing(run) for run in (coarse, finest)]
+    assert errors["swing"][0] == abs(swings[0] - swings[1])
+    # second order: (1/4 - 1/144) of an error against (1/16 - 1/144) of it
+    assert errors["speed"][0] / errors["speed"][1] == pytest.approx(35 / 8, rel=0.2)
 
 
 # ---- closed forms ----

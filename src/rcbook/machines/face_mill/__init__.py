@@ -7,6 +7,7 @@ whatever the speed does; time is a state like any other.
 from rcbook.machines.face_mill.experiment import Controller, Experiment
 from rcbook.machines.face_mill.measures import (
     GROWTH,
+    Evenness,
     current_swing,
     current_swings,
     evenness,
@@ -37,5 +38,5 @@ from rcbook.machines.face_mill.readings import (
     OUTPUTS,
     TORQUES,
 )
-from rcbook.machines.face_mill.searches import largest_stable_depth, onset_of_limit
+from rcbook.machines.face_mill.searches import largest_stable_depth, onset_of_limit, step_errors
 from rcbook.machines.face_mill.simulation import Run, simulate, simulate_all

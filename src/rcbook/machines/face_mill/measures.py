@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from rcbook.machines.face_mill.cut import cut_of
@@ -61,16 +63,26 @@ def current_swing(run: Run, turn: int = -1) -> float:
     return float(current_swings(run)[turn - 1 if turn > 0 else turn])
 
 
-def evenness(run: Run, output: str = "force") -> dict[str, float]:
-    """Spread `before` control, `after` it in the last turn (N or N m), and the `share` in percent.
+class Evenness(NamedTuple):
+    """Spreads in N or N m, in the turn before control and in the last one."""
 
-    Spreads are those of the peaks per tooth pitch, or of the mean torques.
+    before: float
+    after: float
+
+    @property
+    def left(self) -> float:
+        """Share of the spread that control leaves."""
+        return self.after / self.before
+
+
+def evenness(run: Run, output: str = "force") -> Evenness:
+    """How even control makes the peaks per tooth pitch, or the mean torques of the pitches.
+
     Raises ValueError for another output than force or torque.
     """
     one_of(output, OUTPUTS, "output")
     spreads = peak_spreads(run) if output == "force" else torque_spreads(run)
-    before, after = spreads[run.experiment.controlled - 2], spreads[-1]
-    return {"before": before, "after": after, "share": 100 * after / before}
+    return Evenness(spreads[run.experiment.controlled - 2], spreads[-1])
 
 
 def turns_until(run: Run, share: float) -> int:
@@ -106,10 +118,10 @@ def summary(run: Run) -> dict[str, str | float]:
     speed = run.speed[last] / RPM
     return {
         "outcome": outcome(run),
-        "peaks before (N)": force["before"],
-        "at the end (N)": force["after"],
-        "torque before (N m)": torque["before"],
-        "at the end (N m)": torque["after"],
+        "peaks before (N)": force.before,
+        "at the end (N)": force.after,
+        "torque before (N m)": torque.before,
+        "at the end (N m)": torque.after,
         "current from (A)": run.lowest_current[last].min(),
         "to (A)": run.highest_current[last].max(),
         "speed from (rpm)": speed.min(),

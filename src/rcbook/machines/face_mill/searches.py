@@ -1,8 +1,8 @@
-"""Where a cut stops being stable, and where its current meets the limit."""
+"""Where a cut stops being stable, where its current meets the limit, and which steps will do."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +10,7 @@ import scipy.optimize
 
 from rcbook import zdomain
 from rcbook.machines.face_mill.experiment import Experiment
+from rcbook.machines.face_mill.measures import current_swing
 from rcbook.machines.face_mill.mill import FaceMill
 from rcbook.machines.face_mill.model import is_stable
 from rcbook.machines.face_mill.simulation import simulate
@@ -62,3 +63,24 @@ def onset_of_limit(
         return np.inf
     found = scipy.optimize.newton(lambda x: highest(x) - limit, start, x1=second, tol=tolerance)
     return float(found)
+
+
+def step_errors(
+    experiment: Experiment, substeps: Sequence[int], points: int
+) -> dict[str, np.ndarray]:
+    """What all numbers of steps per sample but the last are off from the last, by quantity.
+
+    Force (N), speed (rad/s) and current (A): the largest difference at the samples.  Swing of the
+    current in the last turn (A): its difference, with `points` per sample at which the extremes
+    are looked for.
+    """
+    *coarse, finest = (
+        simulate(replace(experiment, substeps=n, inner=points // n)) for n in substeps
+    )
+    off: dict[str, list] = {name: [] for name in ("force", "speed", "current", "swing")}
+    for run in coarse:
+        for name in ("force", "speed", "current"):
+            at, truth = (getattr(r, name)[:: r.experiment.substeps] for r in (run, finest))
+            off[name].append(np.abs(at - truth).max())
+        off["swing"].append(abs(current_swing(run) - current_swing(finest)))
+    return {name: np.array(errors) for name, errors in off.items()}
