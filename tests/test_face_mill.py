@@ -752,6 +752,38 @@ def test_printed_models_belong_to_a_depth_of_one_and_a_quarter_millimetres():
     }
 
 
+def test_the_digits_of_the_library_are_the_printed_ones_in_their_order():
+    """A second time, from the library's own list: 18 numbers, right to half a digit at 1.25 mm."""
+    printed = "-2.48e5 -0.649 0.829 0.359 -2.95 -2.95 1.55 -3.80e-4 4.62e-12 1.2 0.24 -0.48 0.34 "
+    printed += "0.34 -0.81 0.10 0.82 -7.5e-9"
+    for depth, right in ((1.25e-3, True), (1.23e-3, False)):
+        found = face_mill.sampled_digits(replace(MILL, depth=depth)).digits
+        agree = [
+            abs(x - float(p)) <= half_digit(p) for x, p in zip(found, printed.split(), strict=True)
+        ]
+        assert all(agree) is right
+
+
+def test_the_printed_controller_is_eq_25_term_by_term():
+    """Its value at a point, each term with its power of z as the paper sets it."""
+    z, q = 1.1 * np.exp(0.4j), zdomain.binomial_q(2)
+    top = (1.2, 0.24, -0.48, 0.34, 0.34, -0.81, 0.1, 0.82, -7.5e-9, 1.3e-24, -9.1e-42)
+    bottom = (-2.95, 1.55, -3.80e-4, 4.62e-12, 3.86e-29)
+    f = sum(c * z ** (2 - i) for i, c in enumerate(q))
+    numerator = z**-39 * f * sum(c * z ** (5 - i) for i, c in enumerate(top))
+    denominator = 116 * sum(c * z**-i for i, c in enumerate(bottom)) * (1 - z**-40 * f)
+    law = face_mill.printed_controller(q, -2.95, 39, 40)
+    ours = [zdomain.evaluate(p, z) for p in (law.numerator, law.denominator)]
+    np.testing.assert_allclose(ours, [numerator, denominator], rtol=1e-12)
+
+
+def test_the_last_coefficients_follow_from_the_roots_that_are_given():
+    """With the tiny roots of eq. 24 they are the printed 1.3e-24, -9.1e-42 and 3.86e-29."""
+    mill = replace(MILL, depth=1.25e-3)
+    found = face_mill.last_coefficients(mill, [1.65e-16, 7.412e-18, -8.34e-18])
+    np.testing.assert_allclose(found, [1.3e-24, -9.1e-42, 3.86e-29], rtol=0.05)
+
+
 def test_the_smallest_printed_roots_are_rounding_errors():
     """A pole p is sampled to e^(p step): 3e-23 and 4e-59, where eq. 24 has 1.65e-16 and 7e-18."""
     poles = [-329.169, -856.389]  # eq. 23 has their first three digits

@@ -874,6 +874,24 @@ def test_cuts_stand_side_by_side_under_their_names():
     plt.close("all")
 
 
+def test_moments_show_the_largest_force_of_their_time():
+    run = face_mill.simulate(face_mill.Experiment(MILL, turns=3, substeps=8))
+    fig, axes = plt.subplots(1, 2)
+    pictures.draw_moments(axes, run, 3, (0.25, 0.5), 300)
+    for ax, moment in zip(axes, (0.25, 0.5), strict=True):
+        now = round((2 + moment) * 320) + 1  # 320 steps per turn; a turn begins behind its start
+        assert ax.get_title("center") == f"{run.force[now]:.0f} N"
+    plt.close(fig)
+
+
+def test_lines_carry_their_labels():
+    _, ax = plt.subplots()
+    assert pictures.draw_lines(ax, [1, 2], {"a": [3, 4], "b": [5, 6]}, ylabel="force (N)") is ax
+    assert [line.get_label() for line in ax.lines] == ["a", "b"]
+    assert ax.lines[1].get_ydata().tolist() == [5, 6] and ax.get_ylabel() == "force (N)"
+    plt.close("all")
+
+
 def test_a_table_has_a_row_for_each_name_and_dashes():
     html = pictures.table({"a": {"x": 1.25, "y": None}, "b": {"x": 2.0, "y": "word"}}, 2).to_html()
     assert [cell in html for cell in (">1.25<", ">–<", ">2.00<", ">word<", ">a<", ">y<")] == [

@@ -84,6 +84,14 @@ def draw_cuts(axes: np.ndarray, runs: Mapping[str, face_mill.Run]) -> None:
         ax.set_ylabel("")
 
 
+def draw_lines(ax: Axes, x: ArrayLike, lines: Mapping[str, ArrayLike], **settings) -> Axes:
+    """Curves over the same x, each under its label; the settings are those of `Axes.set`."""
+    for label, y in lines.items():
+        ax.plot(x, y, label=label)
+    ax.set(**settings)
+    return ax
+
+
 def table(rows: Mapping[str, Mapping], decimals: int = 1) -> Styler:
     """Named rows as a table with so many decimals, and a dash for what does not exist."""
     return pd.DataFrame(rows).T.style.format(precision=decimals, na_rep="–")
@@ -240,6 +248,23 @@ def draw_cutter_chips(
 def _clock(radius: ArrayLike, angle: ArrayLike) -> np.ndarray:
     """Points at angles clockwise from the top, coordinates on the first axis."""
     return np.stack(np.broadcast_arrays(radius * np.sin(angle), radius * np.cos(angle)))
+
+
+def draw_moments(
+    axes: Sequence[Axes], run: face_mill.Run, turn: int, moments: Sequence[float], magnified: float
+) -> None:
+    """The cutter and its chips, as `draw_cutter_chips` has them, at moments in parts of a turn.
+
+    Titles are the largest tooth force then.
+    """
+    mill, forces = run.experiment.mill, face_mill.tooth_forces(run)
+    stiffness = mill.cutting_coefficient * mill.depth
+    for ax, moment in zip(axes, moments, strict=True):
+        now = run.during(turn).start + round(moment * run.experiment.steps_per_turn)
+        angles = 2 * np.pi * (run.turns[now] - np.arange(mill.teeth) / mill.teeth)
+        chips = forces[now] / stiffness
+        draw_cutter_chips(ax, angles, chips, mill.diameter / 2, magnified, mill.tooth_feed)
+        ax.set_title(f"{forces[now].max():.0f} N", loc="center")
 
 
 def draw_bore(

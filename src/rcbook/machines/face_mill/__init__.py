@@ -30,6 +30,11 @@ from rcbook.machines.face_mill.mill import (
     sampling_angle,
 )
 from rcbook.machines.face_mill.model import control_model, frequency_response, is_stable
+from rcbook.machines.face_mill.printed import (
+    last_coefficients,
+    printed_controller,
+    sampled_digits,
+)
 from rcbook.machines.face_mill.readings import (
     ENTRIES,
     LIMITS,
