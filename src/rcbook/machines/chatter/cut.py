@@ -1,4 +1,7 @@
-"""A mode in a cut, and the clock of its spindle."""
+"""A mode in a cut, and the clock of its spindle.
+
+    m x'' + c x' + k x = K (h0 + x(one turn ago) - x),   x positive out of the cut
+"""
 
 from __future__ import annotations
 
