@@ -16,7 +16,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
-from test_face_mill import FORCE, HEAVY, MILL, Reference, repetitive_controller
+from oracles.face_mill import Reference
+from test_face_mill import FORCE, HEAVY, MILL, repetitive_controller
 
 from rcbook.machines import face_mill
 from rcbook.machines.face_mill import Experiment

@@ -17,9 +17,9 @@ from rcbook import ledger, zdomain
 from rcbook.loops import repetitive
 from rcbook.loops.repetitive import RepetitiveController
 from rcbook.machines import face_mill
-from rcbook.machines.face_mill import EIGHT_TEETH, RANDOM_RUNOUT, RPM, Experiment
+from rcbook.machines.face_mill import RPM, TSAO_PONG1991, TSAO_PONG1991_RANDOM_RUNOUT, Experiment
 
-MILL = EIGHT_TEETH
+MILL = TSAO_PONG1991
 FINE = {"substeps": 12, "inner": 16}
 CLAIMS = ledger.load("tsao_pong1991").claims
 
@@ -223,7 +223,7 @@ def test_equal_relative_runout_is_learned_far_more_slowly_by_many_teeth():
 
 def test_random_runout_takes_force_and_torque_apart_both_ways():
     """Shares of the spread before control: what is controlled keeps a little more than a tenth."""
-    mill = replace(MILL, runout=RANDOM_RUNOUT)
+    mill = replace(MILL, runout=TSAO_PONG1991_RANDOM_RUNOUT)
     line = ledger.word("regulated")
     for output, kept, lost in (("force", 0, 1), ("torque", 1, 0)):
         run = face_mill.simulate(cutting(mill, output, turns=16))

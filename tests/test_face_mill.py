@@ -1,28 +1,31 @@
 """The face mill against an integration of its equations in the angle, closed forms and print."""
 
-import decimal
-from bisect import bisect_right
 from dataclasses import replace
 from decimal import Decimal
 from functools import cache
-from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import scipy.integrate
+from oracles.face_mill import (
+    RECORDS,
+    Reference,
+    chips_by_hand,
+    control_model_in_decimals,
+    imbalance,
+)
 
 from rcbook import zdomain
 from rcbook.loops import repetitive
 from rcbook.loops.repetitive import RepetitiveController
 from rcbook.machines import face_mill, spindle_drive
-from rcbook.machines.face_mill import EIGHT_TEETH, RANDOM_RUNOUT, RPM, Experiment
+from rcbook.machines.face_mill import RPM, TSAO_PONG1991, TSAO_PONG1991_RANDOM_RUNOUT, Experiment
 
-MILL = EIGHT_TEETH
+MILL = TSAO_PONG1991
 HEAVY = replace(MILL, depth=4.5e-3)
 SMOOTH = replace(MILL, runout=(0.0,) * 8)
 FAST = replace(MILL, speed=700 * RPM)
-RECORDS = ("time", "speed", "current", "force", "torque")
 
 
 def random_runout(teeth, size, seed):
@@ -36,168 +39,7 @@ def repetitive_controller(mill, gain=1.0, passes=2, torque_feedback=True):
     return RepetitiveController(inverse, mill.samples_per_turn, gain, zdomain.binomial_q(passes))
 
 
-# ---- the equations, written down a second time ----
-
-
-class Reference:
-    """Eqs 1-9 and 12 with fig. 3, by an adaptive method in the cutter angle, pitch by pitch.
-
-    From one entry, exit or sample to the next the teeth in the cut and the command are constant;
-    the time one tooth pitch ago comes from the piece that was integrated then.  `held_over` is the
-    width, as a part of the limit, over which the velocity integral fades out, so that a sliding
-    along the limit stays a differential equation.  Records stand at every quarter of a sample.
-    """
-
-    QUARTERS = 4
-
-    def __init__(self, experiment, turns, rtol=1e-9, held_over=1e-3):
-        self.one, self.mill, self.drive = experiment, experiment.mill, experiment.mill.drive
-        self.held_over, self.rtol, m = held_over, rtol, self.mill
-        self.pitch, self.feed = 2 * np.pi / m.teeth, m.feed_per_turn * m.speed / (2 * np.pi)
-        self.stiffness = m.cutting_coefficient * m.depth
-        self.per_turn = m.teeth * m.samples_per_pitch
-        self.starts, self.times = [-np.inf], [lambda angle: angle / m.speed]
-        self.records, self.seen, self.sent = {name: [] for name in RECORDS}, [], []
-        self.standstill = None
-        self.run(turns)
-
-    def at_rest(self):
-        """Speed, current, tachometer, current integral, velocity integral and time."""
-        d, w = self.drive, self.mill.speed
-        i = d.friction * w / d.torque_constant
-        amplified = (d.resistance * i + d.back_emf * w) / (d.loop_gain * d.current_integral)
-        return np.array([w, i, d.tacho_gain * w, amplified, d.current_feedback * i, 0.0])
-
-    def time_before(self, angle):
-        """Time at one tooth pitch before an angle."""
-        angle -= self.pitch
-        return self.times[bisect_right(self.starts, angle + 1e-12) - 1](angle)
-
-    def teeth_at(self, angle):
-        """Teeth in the cut at an angle that is no entry or exit."""
-        engaged = 2 * np.pi * (self.one.engaged - 1)
-        if angle < engaged:
-            return ()
-        own = [(angle - tooth * self.pitch) % (2 * np.pi) for tooth in range(self.mill.teeth)]
-        entered = [angle - (a - self.mill.entry) for a in own]
-        return tuple(
-            tooth
-            for tooth, a in enumerate(own)
-            if self.mill.entry < a < self.mill.exit
-            and (self.one.entry == "at once" or entered[tooth] > engaged - 1e-9)
-        )
-
-    def chips(self, angle, fed, teeth):
-        chips = [fed * np.sin(angle - i * self.pitch) + self.mill.runout[i] for i in teeth]
-        return chips if self.one.keep_negative else [max(0.0, chip) for chip in chips]
-
-    def loads(self, angle, state, teeth):
-        """Largest force and torque."""
-        fed = self.feed * (state[5] - self.time_before(angle))
-        force = self.stiffness * max(self.chips(angle, fed, teeth), default=0.0)
-        if self.one.torque == "instantaneous":
-            fed = self.feed * self.pitch / state[0]
-        total = sum(self.chips(angle, fed, teeth))
-        return force, self.mill.diameter / 2 * self.stiffness * total
-
-    def rates(self, angle, state, teeth, command):
-        d = self.drive
-        w, i, wa, current_integral, velocity_integral, _ = state
-        torque = self.loads(angle, state, teeth)[1] if teeth else 0.0
-        wanted = d.velocity_gain * (command - wa) + velocity_integral
-        limit = d.current_feedback * d.current_limit
-        missing = min(max(wanted, -limit), limit) - d.current_feedback * i
-        voltage = d.loop_gain * (d.current_gain * missing + d.current_integral * current_integral)
-        running = 1.0
-        if self.one.limit == "hold":
-            running = min(max(1 + (1 - abs(wanted) / limit) / self.held_over, 0.0), 1.0)
-        by_time = [
-            (d.torque_constant * i - d.friction * w - torque) / d.inertia,
-            (voltage - d.resistance * i - d.back_emf * w) / d.inductance,
-            (d.tacho_gain * w - wa) / d.tacho_lag,
-            missing,
-            running * d.velocity_integral * (command - wa),
-            1.0,
-        ]
-        return np.array(by_time) / max(w, 1e-4 * self.mill.speed)
-
-    def command_at(self, k):
-        """What the controller adds at sample k, by its difference equation."""
-        if self.one.controller is None:
-            return 0.0
-        numerator, denominator = self.one.controller.numerator, self.one.controller.denominator
-        begun = (self.one.controlled - 1) * self.per_turn
-        target = self.stiffness * self.mill.feed_per_turn / self.mill.teeth
-        if self.one.output == "torque":  # eq. 13
-            arc = np.cos(self.mill.entry) - np.cos(self.mill.exit)
-            target = self.mill.diameter / 2 * self.stiffness * self.feed / self.mill.speed * arc
-        total = 0.0
-        for lag, c in enumerate(numerator[: k - begun + 1] if k >= begun else ()):
-            total += c * (target - self.seen[k - lag])
-        for lag, c in enumerate(denominator[1 : k + 1], 1):
-            total -= c * self.sent[k - lag]
-        return total / denominator[0]
-
-    def record(self, state, loads):
-        for name, value in zip(RECORDS, (state[5], *state[:2], *loads), strict=True):
-            self.records[name].append(value)
-
-    def pieces(self, first, last):
-        """Edges between two angles at which a tooth enters or leaves."""
-        edges = [first, last]
-        for tooth in range(self.mill.teeth):
-            for border in (self.mill.entry, self.mill.exit):
-                here = tooth * self.pitch + border
-                here += 2 * np.pi * np.ceil((first + 1e-9 - here) / (2 * np.pi))
-                if here < last - 1e-9:
-                    edges.append(here)
-        return sorted(edges)
-
-    def run(self, turns):
-        state, loads = self.at_rest(), (0.0, 0.0)
-        sizes = np.array([state[0], 10.0, state[2], state[3], 0.05, 0.1])
-        base = self.drive.tacho_gain * self.mill.speed
-        step = 2 * np.pi / self.per_turn
-        self.record(state, loads)
-
-        def slow(angle, state, *_):
-            return state[0] - 0.01 * self.mill.speed
-
-        slow.terminal = True
-        for k in range(turns * self.per_turn):
-            self.seen.append(loads[self.one.output == "torque"])
-            self.sent.append(self.command_at(k))
-            edges = self.pieces(k * step, (k + 1) * step)
-            ticks = step * (k + np.arange(1, self.QUARTERS + 1) / self.QUARTERS)
-            for start, end in pairwise(edges):
-                teeth = self.teeth_at((start + end) / 2)
-                done = scipy.integrate.solve_ivp(
-                    self.rates,
-                    (start, end),
-                    state,
-                    method="LSODA",
-                    args=(teeth, base + self.sent[k]),
-                    rtol=self.rtol,
-                    atol=self.rtol * sizes,
-                    dense_output=True,
-                    events=slow,
-                )
-                assert done.success
-                if done.status == 1:
-                    self.standstill = done.t[-1] / (2 * np.pi)
-                    return
-                self.starts.append(start)
-                self.times.append(lambda angle, path=done.sol: path(angle)[5])
-                for tick in ticks[(ticks > start + 1e-9) & (ticks <= end + 1e-9)]:
-                    now = done.sol(tick) if tick < end - 1e-9 else done.y[:, -1]
-                    loads = self.loads(tick, now, teeth)
-                    self.record(now, loads)
-                state = done.y[:, -1]
-
-    def difference(self, run, name):
-        """Largest difference of a record of a run from this one."""
-        every = run.experiment.substeps // self.QUARTERS
-        return np.abs(getattr(run, name)[::every] - np.array(self.records[name])).max()
+# ---- against the equations, written down a second time ----
 
 
 UNEVEN = replace(MILL, runout=random_runout(8, 10e-6, 1))
@@ -394,18 +236,6 @@ def test_an_idle_spindle_stays_at_its_nominal_speed():
         assert (run.seen == 0).all() and np.ptp(run.command) == 0
 
 
-def imbalance(run, over):
-    """Momentum over time, or energy over angle, that the run's own records do not explain."""
-    d = run.experiment.mill.drive
-    torque = d.torque_constant * run.current - d.friction * run.speed - run.torque
-    along, stored = {
-        "time": (run.time, d.inertia * run.speed),
-        "angle": (2 * np.pi * run.turns, d.inertia * run.speed**2 / 2),
-    }[over]
-    done = scipy.integrate.cumulative_trapezoid(torque, along, initial=0)
-    return np.abs(stored - stored[0] - done).max() / np.ptp(stored)
-
-
 @pytest.mark.parametrize("mill", [SMOOTH, replace(HEAVY, runout=SMOOTH.runout)])
 def test_torque_turns_into_speed(mill):
     """J dw = (Cw1 i - B w - T) dt, by the trapezoidal rule: an error of second order.
@@ -423,30 +253,10 @@ def test_torque_turns_into_speed(mill):
         assert imbalance(wrong, over) > 5e-3  # a mutant
 
 
-def chips_by_hand(run):
-    """Chip thickness of every tooth from the run's own clock, NaN for a tooth out of the cut."""
-    one, mill = run.experiment, run.experiment.mill
-    n, back = one.steps_per_turn, one.mill.samples_per_pitch * one.substeps
-    chips = np.full((run.time.size, mill.teeth), np.nan)
-    for k in range(1, run.time.size):
-        if k <= (one.engaged - 1) * n:
-            continue
-        before = run.time[k - back] if k >= back else (k - back) * 2 * np.pi / n / mill.speed
-        for tooth in range(mill.teeth):
-            middle = (2 * np.pi * (k - 0.5) / n - tooth * mill.pitch) % (2 * np.pi)
-            entered = (k - 0.5) - (middle - mill.entry) * n / (2 * np.pi)
-            late = one.entry == "one by one" and entered < (one.engaged - 1) * n - 1e-6
-            if mill.entry < middle < mill.exit and not late:
-                own = 2 * np.pi * k / n - tooth * mill.pitch
-                fed = mill.feed_per_turn * mill.speed / (2 * np.pi) * (run.time[k] - before)
-                chips[k, tooth] = fed * np.sin(own) + mill.runout[tooth]
-    return chips
-
-
 @pytest.mark.parametrize("negative", [False, True])
 @pytest.mark.parametrize("entry", face_mill.ENTRIES)
 def test_forces_torque_and_teeth_without_a_chip_follow_from_the_clock(entry, negative):
-    mill = replace(PART, runout=RANDOM_RUNOUT)
+    mill = replace(PART, runout=TSAO_PONG1991_RANDOM_RUNOUT)
     run = face_mill.simulate(
         Experiment(mill, turns=3, substeps=4, entry=entry, keep_negative=negative)
     )
@@ -504,6 +314,26 @@ def test_the_controller_sees_the_record_and_answers_by_its_recursion(measure, ou
     base = MILL.drive.tacho_gain * MILL.speed
     np.testing.assert_allclose(run.command, base + np.array(answer), rtol=1e-12)
     assert np.ptp(run.command[:first]) == 0 < np.ptp(run.command[first:])
+
+
+def test_a_plant_a_repetitive_controller_and_a_pair_of_polynomials_control_alike():
+    """The protocol asks for two polynomials and for nothing else."""
+    law = face_mill.control_model(MILL)
+    plant = replace(law, b=1e-6 * law.b)
+    for controller in (plant, FORCE):
+        pair = SimpleNamespace(
+            numerator=controller.numerator.tolist(), denominator=list(controller.denominator)
+        )
+        one = Experiment(MILL, controller, engaged=1, controlled=2, turns=3, substeps=2)
+        run, same = face_mill.simulate_all([one, replace(one, controller=pair)])
+        assert np.ptp(run.command) > 0
+        np.testing.assert_array_equal(run.speed, same.speed)
+
+
+@pytest.mark.parametrize("controller", [1.0, SimpleNamespace(numerator=[1.0])])
+def test_what_is_no_controller_is_refused_at_the_door(controller):
+    with pytest.raises(TypeError, match=r"controller .* has no .*such as a zdomain\.Plant"):
+        Experiment(MILL, controller)
 
 
 def test_control_later_than_the_end_changes_nothing():
@@ -686,6 +516,100 @@ def test_outcome_needs_turns_before_and_after(engaged, controlled, turns):
         face_mill.outcome(replace(run, experiment=one))
 
 
+@pytest.mark.parametrize("output", face_mill.OUTPUTS)
+def test_evenness_is_the_spread_before_and_after_control(output):
+    run = face_mill.simulate(Experiment(MILL, FORCE, controlled=3, turns=5, substeps=2))
+    record, pick = {"force": (run.force, np.max), "torque": (run.torque, np.mean)}[output]
+    spread = {}
+    for turn in (2, 5):
+        pitches = np.split(record[run.during(turn)], 8)
+        spread[turn] = np.ptp([pick(pitch) for pitch in pitches])
+    found = face_mill.evenness(run, output)
+    assert found == (spread[2], spread[5])
+    assert found.left == spread[5] / spread[2]
+
+
+@pytest.mark.parametrize(
+    "share, turns", [(1.0, 0), (0.49, 2), (0.1, 4), (0.05, 5), (0.02, 6), (0.001, 7)]
+)
+def test_turns_until_a_share_is_left_counts_to_the_last_turn_above_it(share, turns):
+    run = with_spreads([0, 9, 10, 5, 4.9, 0.9, 1.1, 0.9, 0.5, 0.1])
+    assert face_mill.turns_until(run, share) == turns
+
+
+def revolutions(run, spread):
+    """Tooth by tooth: how far one must go until every turn behind is even enough."""
+    peaks = face_mill.pitch_peaks(run)[run.experiment.controlled - 1 :].ravel()
+    for first in range(peaks.size - 7):
+        behind = range(first, peaks.size - 7)
+        if all(max(peaks[k : k + 8]) - min(peaks[k : k + 8]) <= spread for k in behind):
+            return first / 8
+    return np.inf
+
+
+def test_revolutions_until_even_enough_are_counted_by_teeth():
+    run = face_mill.simulate(Experiment(MILL, FORCE, controlled=3, turns=8, substeps=2))
+    found = {s: face_mill.revolutions_until(run, s) for s in (100, 10, 5, 1, 0.5, 1e-6)}
+    assert found == {s: revolutions(run, s) for s in found}
+    assert found[100] == 0 and found[1e-6] == np.inf and 0 < found[10] < found[1] < 6
+
+
+def test_a_summary_has_the_numbers_of_the_last_turn():
+    run = face_mill.simulate(Experiment(MILL, FORCE, turns=10, substeps=2))
+    row = face_mill.summary(run)
+    assert row["outcome"] == face_mill.outcome(run)
+    assert row["to (A)"] - row["current from (A)"] == 2 * face_mill.current_swing(run)
+    assert row["to (rpm)"] == run.speed[-80:].max() * 60 / (2 * np.pi)
+    assert list(row)[1:5] == [
+        "peaks before (N)",
+        "at the end (N)",
+        "torque before (N m)",
+        "at the end (N m)",
+    ]
+
+
+# ---- searches ----
+
+
+def test_the_largest_stable_depth_lies_between_a_stable_and_an_unstable_cut():
+    """Drive and cut alone; with a loop that has roots outside from 2 mm on, it ends there."""
+    deepest = face_mill.largest_stable_depth(MILL, "instantaneous")
+    for depth, stable in ((deepest, True), (deepest + 1e-6, False)):
+        assert face_mill.is_stable(replace(MILL, depth=depth), "instantaneous") is stable
+    found = face_mill.largest_stable_depth(
+        MILL, "instantaneous", lambda mill: 2 * (mill.depth > 2e-3)
+    )
+    assert 2e-3 - 1e-6 < found <= 2e-3
+    assert face_mill.largest_stable_depth(MILL, roots_outside=lambda _: 2) == 0
+
+
+def test_the_onset_of_the_limit_is_where_the_current_begins_to_be_cut_off():
+    """Controlled at rising speeds; the flag of the limit tells the two sides apart."""
+
+    def at(rpm, limit=50.0):
+        drive = replace(MILL.drive, current_limit=limit)
+        mill = replace(MILL, drive=drive, speed=rpm * RPM)
+        return Experiment(mill, repetitive_controller(mill), turns=16, substeps=4, inner=8)
+
+    onset = face_mill.onset_of_limit(at, 500.0, 510.0, 550.0, 0.05)
+    for rpm, cut_off in ((onset - 5, False), (onset + 5, True)):
+        run = face_mill.simulate(at(rpm))
+        assert run.saturated[run.during(-1)].any() == cut_off
+    assert face_mill.onset_of_limit(lambda rpm: at(rpm, 1e3), 500.0, 510.0, 550.0, 1) == np.inf
+
+
+def test_step_errors_are_the_differences_from_the_finest_run_at_the_samples():
+    one = Experiment(MILL, turns=3)
+    errors = face_mill.step_errors(one, (2, 4, 12), 24)
+    finest, coarse = (face_mill.simulate(replace(one, substeps=n, inner=24 // n)) for n in (12, 2))
+    by_hand = max(abs(coarse.current[2 * k] - finest.current[12 * k]) for k in range(121))
+    assert errors["current"][0] == by_hand
+    swings = [face_mill.current_swing(run) for run in (coarse, finest)]
+    assert errors["swing"][0] == abs(swings[0] - swings[1])
+    # second order: (1/4 - 1/144) of an error against (1/16 - 1/144) of it
+    assert errors["speed"][0] / errors["speed"][1] == pytest.approx(35 / 8, rel=0.2)
+
+
 # ---- closed forms ----
 
 
@@ -828,6 +752,38 @@ def test_printed_models_belong_to_a_depth_of_one_and_a_quarter_millimetres():
     }
 
 
+def test_the_digits_of_the_library_are_the_printed_ones_in_their_order():
+    """A second time, from the library's own list: 18 numbers, right to half a digit at 1.25 mm."""
+    printed = "-2.48e5 -0.649 0.829 0.359 -2.95 -2.95 1.55 -3.80e-4 4.62e-12 1.2 0.24 -0.48 0.34 "
+    printed += "0.34 -0.81 0.10 0.82 -7.5e-9"
+    for depth, right in ((1.25e-3, True), (1.23e-3, False)):
+        found = face_mill.sampled_digits(replace(MILL, depth=depth)).digits
+        agree = [
+            abs(x - float(p)) <= half_digit(p) for x, p in zip(found, printed.split(), strict=True)
+        ]
+        assert all(agree) is right
+
+
+def test_the_printed_controller_is_eq_25_term_by_term():
+    """Its value at a point, each term with its power of z as the paper sets it."""
+    z, q = 1.1 * np.exp(0.4j), zdomain.binomial_q(2)
+    top = (1.2, 0.24, -0.48, 0.34, 0.34, -0.81, 0.1, 0.82, -7.5e-9, 1.3e-24, -9.1e-42)
+    bottom = (-2.95, 1.55, -3.80e-4, 4.62e-12, 3.86e-29)
+    f = sum(c * z ** (2 - i) for i, c in enumerate(q))
+    numerator = z**-39 * f * sum(c * z ** (5 - i) for i, c in enumerate(top))
+    denominator = 116 * sum(c * z**-i for i, c in enumerate(bottom)) * (1 - z**-40 * f)
+    law = face_mill.printed_controller(q, -2.95, 39, 40)
+    ours = [zdomain.evaluate(p, z) for p in (law.numerator, law.denominator)]
+    np.testing.assert_allclose(ours, [numerator, denominator], rtol=1e-12)
+
+
+def test_the_last_coefficients_follow_from_the_roots_that_are_given():
+    """With the tiny roots of eq. 24 they are the printed 1.3e-24, -9.1e-42 and 3.86e-29."""
+    mill = replace(MILL, depth=1.25e-3)
+    found = face_mill.last_coefficients(mill, [1.65e-16, 7.412e-18, -8.34e-18])
+    np.testing.assert_allclose(found, [1.3e-24, -9.1e-42, 3.86e-29], rtol=0.05)
+
+
 def test_the_smallest_printed_roots_are_rounding_errors():
     """A pole p is sampled to e^(p step): 3e-23 and 4e-59, where eq. 24 has 1.65e-16 and 7e-18."""
     poles = [-329.169, -856.389]  # eq. 23 has their first three digits
@@ -837,74 +793,14 @@ def test_the_smallest_printed_roots_are_rounding_errors():
     np.testing.assert_allclose(a[4:] / a[3:-1], -sampled, rtol=1e-3)  # 1e-3 rad^-1 in the poles
 
 
-def matrix_product(x, y):
-    return [
-        [sum(a * b for a, b in zip(row, column, strict=True)) for column in zip(*y, strict=True)]
-        for row in x
-    ]
-
-
-def exponential(m, halvings):
-    """e^m in decimals: a series for m/2^halvings, squared."""
-    size = range(len(m))
-    m = [[x / 2**halvings for x in row] for row in m]
-    term = total = [[Decimal(i == j) for j in size] for i in size]
-    for k in range(1, 60):
-        term = [[x / k for x in row] for row in matrix_product(term, m)]
-        total = [[total[i][j] + term[i][j] for j in size] for i in size]
-    for _ in range(halvings):
-        total = matrix_product(total, total)
-    return total
-
-
-def characteristic(m):
-    """Coefficients of det(1 - m/z), by Faddeev and LeVerrier."""
-    size, found = range(len(m)), [Decimal(1)]
-    power = [[Decimal(i == j) for j in size] for i in size]
-    for k in range(1, len(m) + 1):
-        product = matrix_product(m, power)
-        found.append(-sum(product[i][i] for i in size) / k)
-        power = [[product[i][j] + found[k] * (i == j) for j in size] for i in size]
-    return found
-
-
 @pytest.mark.parametrize("depth", ["1.23e-3", "4.5e-3"])
 def test_control_model_has_every_digit_of_a_computation_in_160_digits(depth):
     """From table 1 by matrix exponential and characteristic polynomial, without any modes."""
-    with decimal.localcontext(prec=160):
-        pi = Decimal("3.14159265358979323846264338327950288419716939937510582097494459")
-        w0, k = 200 * 2 * pi / 60, Decimal("7.6332e8") * Decimal(depth)
-        v0 = Decimal("0.48e-3") * w0 / (2 * pi)
-        slope = -Decimal("0.05") * k * 2 * v0 / w0**2
-        inertia, friction, inductance = map(Decimal, ("0.04041", "0.02158", "0.0063"))
-        kt, kpv, kiv, kf = map(Decimal, ("0.91", "2.805", "241", "0.05"))
-        tacho, lag = Decimal("0.0286"), Decimal("0.0004")
-        p, i = Decimal(13) * 240, Decimal(13) * 1200000
-        rows = [  # speed, current, tachometer, two integrals, command, integral of the speed
-            [-(friction + slope) / inertia, kt / inertia, 0, 0, 0, 0, 0],
-            [-kt, -(Decimal("0.45") + p * kf), -p * kpv, i, p, p * kpv, 0],
-            [tacho / lag, 0, -1 / lag, 0, 0, 0, 0],
-            [0, -kf, -kpv, 0, 1, kpv, 0],
-            [0, 0, -kiv, 0, 0, kiv, 0],
-            [0, 0, 0, 0, 0, 0, 0],
-            [1, 0, 0, 0, 0, 0, 0],
-        ]
-        rows[1] = [x / inductance for x in rows[1]]
-        step = 2 * pi / 40
-        whole = exponential([[Decimal(x) * step / w0 for x in row] for row in rows], 40)
-        # the last row integrates over time; over the angle it is w0 times as much
-        a = characteristic([row[:5] for row in whole[:5]])
-        state, impulse = [[row[5]] for row in whole[:5]], [whole[6][5] * w0]
-        for _ in range(5):
-            impulse.append(matrix_product([whole[6][:5]], state)[0][0] * w0)
-            state = matrix_product([row[:5] for row in whole[:5]], state)
-        b = [sum(a[m] * impulse[n - m] for m in range(n + 1)) for n in range(6)]
-        b = [-k * v0 / w0**2 * x for x in b]
-        b = [sum(b[max(0, n - 4) : n + 1]) for n in range(10)]  # five intervals to a pitch
+    b, a = control_model_in_decimals(depth)
     plant = face_mill.control_model(replace(MILL, depth=float(depth)))
     # e^-134 is known to 134 roundings, and eigenvalues to 1e4 of theirs
-    np.testing.assert_allclose(plant.a, list(map(float, a)), rtol=1e-9)
-    np.testing.assert_allclose(plant.b, list(map(float, b)), rtol=1e-9)
+    np.testing.assert_allclose(plant.a, a, rtol=1e-9)
+    np.testing.assert_allclose(plant.b, b, rtol=1e-9)
     assert plant.b[9] < 1e-30 and abs(plant.a[5]) < 1e-80  # as small as that
 
 
@@ -1081,8 +977,8 @@ def test_eccentric_runout_is_the_chord_between_teeth_on_a_circle(teeth):
 
 
 def test_printed_runouts_sum_to_zero():
-    assert abs(sum(MILL.runout)) < 1e-20 and abs(sum(RANDOM_RUNOUT)) < 1e-20
-    assert replace(MILL, runout=RANDOM_RUNOUT).runout == RANDOM_RUNOUT
+    assert abs(sum(MILL.runout)) < 1e-20 and abs(sum(TSAO_PONG1991_RANDOM_RUNOUT)) < 1e-20
+    assert replace(MILL, runout=TSAO_PONG1991_RANDOM_RUNOUT).runout == TSAO_PONG1991_RANDOM_RUNOUT
 
 
 # ---- bad input ----

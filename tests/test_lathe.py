@@ -1,15 +1,13 @@
 """The lathe's servos against the printed polynomials, and sections against geometry."""
 
-import itertools
-
 import numpy as np
 import pytest
-import scipy.integrate
+from oracles.lathe import area
 
 from rcbook import zdomain
 from rcbook.machines import lathe
 
-SERVO = lathe.ELECTRIC_SERVO
+SERVO = lathe.LEE_OH_KIM
 SEEDS = range(4)
 SIDES = [3, 4, 5, 6, 11]
 
@@ -19,7 +17,7 @@ SIDES = [3, 4, 5, 6, 11]
 
 def test_electric_servo_multiplies_out_to_eq_16():
     """y = 0.14 (u1 + 3.2 u2 + 1.8711 u3) + 0.16 y1 - 0.003 y2 - 0.0063 y3: exact products."""
-    plant = lathe.ELECTRIC_SERVO.plant
+    plant = lathe.LEE_OH_KIM.plant
     np.testing.assert_allclose(plant.b / 0.14, [1, 3.2, 1.8711], rtol=1e-14)
     np.testing.assert_allclose(-plant.a[1:], [0.16, -0.003, -0.0063], atol=1e-16)
     assert (plant.delay, plant.dt) == (1, 0.01)
@@ -28,7 +26,7 @@ def test_electric_servo_multiplies_out_to_eq_16():
 def test_electric_servo_reflects_to_eq_17():
     """The taps are printed to four decimals, rounded; the divisor 1.6458 is not: 0.14 3.43^2 is
     1.6471, so the printed one is 8e-4 of it too small."""
-    law = zdomain.zero_phase_inverse(lathe.ELECTRIC_SERVO.plant, normalisation="dc")
+    law = zdomain.zero_phase_inverse(lathe.LEE_OH_KIM.plant, normalisation="dc")
     exact = law.b / law.b[0] * 2.43
     np.testing.assert_allclose(exact, [2.43, 0.6112, -0.1527, 0.0183, 0.0063], atol=0.5e-4)
     np.testing.assert_allclose(law.a / law.a[0], [1, 0.77], atol=1e-14)
@@ -42,7 +40,7 @@ def test_electric_servo_reflects_to_eq_17():
 
 
 def test_electric_servo_under_zero_phase_tracking_is_eq_19():
-    plant = lathe.ELECTRIC_SERVO.plant
+    plant = lathe.LEE_OH_KIM.plant
     _, b_minus = zdomain.split_zeros(plant.b)
     taps = np.convolve(b_minus, b_minus[::-1])
     # printed: 2.43, 6.9, 2.43 over 11.76; 1 + 2.43^2 = 6.9049 and 3.43^2 = 11.7649
@@ -53,7 +51,7 @@ def test_electric_servo_under_zero_phase_tracking_is_eq_19():
 
 
 def test_nc_lathe_multiplies_out_to_eq_21():
-    plant = lathe.NC_LATHE.plant
+    plant = lathe.LEE_OH_KIM_NC.plant
     np.testing.assert_allclose(plant.b, [0.046, 0.138], rtol=1e-14)
     # (1 - 0.6/z)^2 + (0.15/z)^2
     np.testing.assert_allclose(plant.a, [1, -1.2, 0.3825], rtol=1e-14)
@@ -61,7 +59,7 @@ def test_nc_lathe_multiplies_out_to_eq_21():
     np.testing.assert_allclose(np.sort_complex(plant.poles), [0.6 - 0.15j, 0.6 + 0.15j])
 
 
-@pytest.mark.parametrize("servo", [lathe.ELECTRIC_SERVO, lathe.NC_LATHE], ids=["eq 13", "eq 21"])
+@pytest.mark.parametrize("servo", [lathe.LEE_OH_KIM, lathe.LEE_OH_KIM_NC], ids=["eq 13", "eq 21"])
 @pytest.mark.parametrize("zeros, poles", [(1.0, 1.0), (1.25, 1.25), (0.75, 0.75), (1.1, 0.9)])
 def test_a_misjudged_servo_has_scaled_roots_and_the_same_gain(servo, zeros, poles):
     plant = servo.misjudged(zeros=zeros, poles=poles).plant
@@ -97,13 +95,15 @@ def test_the_steady_gain_is_the_product_of_the_factors_at_one():
     # eq. 13 at z = 1, by hand
     by_hand = 0.14 * 1.77 * 3.43 / (1.14 * (0.85**2 + 0.15**2))
     assert SERVO.steady_gain == pytest.approx(by_hand, rel=1e-14)
-    assert lathe.NC_LATHE.steady_gain == pytest.approx(0.046 * 4 / (0.4**2 + 0.15**2), rel=1e-14)
+    assert lathe.LEE_OH_KIM_NC.steady_gain == pytest.approx(
+        0.046 * 4 / (0.4**2 + 0.15**2), rel=1e-14
+    )
 
 
 def test_misjudging_back_and_forth_gives_the_servo():
-    there = lathe.ELECTRIC_SERVO.misjudged(2.0, 0.5)
+    there = lathe.LEE_OH_KIM.misjudged(2.0, 0.5)
     back = there.misjudged(0.5, 2.0)
-    assert back == lathe.ELECTRIC_SERVO != there  # powers of two: exact
+    assert back == lathe.LEE_OH_KIM != there  # powers of two: exact
 
 
 def test_a_servo_without_zeros_or_poles_is_a_delay():
@@ -173,17 +173,9 @@ def test_polygon_points_lie_on_the_half_planes_of_its_sides(sides, seed):
     assert np.abs(turned - r).max() > 0.01
 
 
-def area(section):
-    """Half the integral of r^2, piece by piece between the corners of all tested polygons."""
-    kinks = sorted({np.pi * (2 * k + 1) / n % (2 * np.pi) for n in SIDES for k in range(n)})
-    edges = [0.0, *kinks, 2 * np.pi]
-    pieces = itertools.pairwise(edges)
-    return sum(scipy.integrate.quad(lambda t: section(t) ** 2 / 2, a, b)[0] for a, b in pieces)
-
-
 @pytest.mark.parametrize("sides", SIDES)
 def test_polygon_has_the_area_of_its_triangles(sides):
-    found = area(lambda t: lathe.polygon_section(t, sides, 2.5))
+    found = area(lambda t: lathe.polygon_section(t, sides, 2.5), SIDES)
     # quad is asked for 1.5e-8 and reaches far less on smooth pieces
     assert found == pytest.approx(sides * 2.5**2 * np.tan(np.pi / sides), rel=1e-8)
 
@@ -196,7 +188,7 @@ def test_ellipse_satisfies_its_equation_and_has_its_extremes_and_area(a, b):
     r = lathe.ellipse_section(t, a, b)
     np.testing.assert_allclose((r * np.cos(t) / a) ** 2 + (r * np.sin(t) / b) ** 2, 1, rtol=1e-13)
     assert np.all((r >= min(a, b) * (1 - 1e-15)) & (r <= max(a, b) * (1 + 1e-15)))
-    found = area(lambda t: lathe.ellipse_section(t, a, b))
+    found = area(lambda t: lathe.ellipse_section(t, a, b), SIDES)
     assert found == pytest.approx(np.pi * a * b, rel=1e-8)
     swapped = lathe.ellipse_section(t, b, a)  # a mutant: half axes exchanged
     wrong = (swapped * np.cos(t) / a) ** 2 + (swapped * np.sin(t) / b) ** 2

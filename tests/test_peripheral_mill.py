@@ -6,6 +6,12 @@ import control
 import numpy as np
 import pytest
 import scipy.signal
+from oracles.peripheral_mill import (
+    EXACT,
+    continuous_modal_system,
+    recursion,
+    step_with_a_sine_part,
+)
 
 from rcbook.loops import repetitive
 from rcbook.loops.repetitive import Process
@@ -15,7 +21,6 @@ from rcbook.zdomain import Plant
 
 PLANT = HORNG1989.plant
 SLOW, FAST = 0.9952, -0.2415  # thesis, text after eq. 8
-EXACT = np.roots([1, -0.7537, -0.2404])
 HALF_DIGIT = 0.00005  # four printed decimals
 CUT = 0.0001  # the same, cut instead of rounded
 
@@ -36,12 +41,8 @@ def test_plant_has_the_printed_poles_and_zero():
 
 def test_recursion_of_the_plant_is_equation_8():
     v = np.random.default_rng(0).standard_normal(50)
-    force = np.zeros(50)
-    for k in range(50):
-        force[k] = 0.7537 * force[k - 1] * (k > 0) + 0.2404 * force[k - 2] * (k > 1)
-        force[k] += 9.0452 * v[k - 1] * (k > 0) - 7.8975 * v[k - 2] * (k > 1)
     ours = scipy.signal.lfilter(PLANT.numerator, PLANT.a, v)
-    np.testing.assert_allclose(ours, force, atol=1e-12)  # rounding
+    np.testing.assert_allclose(ours, recursion(v), atol=1e-12)  # rounding
 
 
 def test_closed_loop_is_the_printed_equation_12():
@@ -147,22 +148,9 @@ def test_an_even_subsampling_tells_the_mappings_apart():
     assert error["keep sign"] > 0.1
 
 
-def continuous_modal_system():
-    """sum of g_i (1 - mode_i(t)): a lag for the slow pole, a damped cosine for the other."""
-    b0, b1 = PLANT.b
-    slow, fast = max(EXACT), min(EXACT)
-    gains = [(b0 * p + b1) / (p - other) / (1 - p) for p, other in ((slow, fast), (fast, slow))]
-    # t = 0: g1 + g2 - g1 - g2 = 0; mode of p is e^(t ln|p|/T) cos(pi t/T) when p < 0
-    sigma1, sigma2, omega = np.log(slow) / PLANT.dt, np.log(-fast) / PLANT.dt, np.pi / PLANT.dt
-    # step response 1 - e^(s t) cos(w t) has the transfer 1 - s (s - sigma)/((s - sigma)^2 + w^2)
-    lag = control.tf([-sigma1], [1, -sigma1])
-    cosine = control.tf([-sigma2, sigma2**2 + omega**2], [1, -2 * sigma2, sigma2**2 + omega**2])
-    return gains[0] * control.ss(lag) + gains[1] * control.ss(cosine)
-
-
 @pytest.mark.parametrize("rate", [20.0, 37.3, 60.0, 80.0, 100.0, 120.0, 1000.0])
 def test_damped_cosine_samples_lie_on_one_continuous_response(rate):
-    system = continuous_modal_system()
+    system = continuous_modal_system(PLANT)
     t = np.arange(30) / rate
     truth = control.step_response(system, t).outputs
     ours = step_response(resample(PLANT, 1 / rate, "damped cosine"), 30)
@@ -212,13 +200,6 @@ def test_a_mill_resampled_to_twelve_per_turn_counts_twelve():
 def test_sine_part_belongs_to_a_continuous_machine_that_sixty_hertz_does_not_show(sine, rate):
     """Step response of the modes in continuous time, written down and sampled."""
     assert np.allclose(resample(PLANT, 1 / 60, "damped cosine", sine).b, PLANT.b, atol=1e-9)
-    slow, fast = PLANT.poles
-    gains = [
-        float(np.polyval(PLANT.b[::-1], 1 / p) / (1 - q / p) / (1 - p))
-        for p, q in ((slow, fast), (fast, slow))
-    ]
-    t = np.arange(30) * 60 / rate  # in intervals of 1/60 s
-    swing = np.abs(fast) ** t * (np.cos(np.pi * t) + sine * np.sin(np.pi * t))
-    truth = gains[0] * (1 - slow**t) + gains[1] * (1 - swing)
+    truth = step_with_a_sine_part(PLANT, rate, sine, 30)
     found = step_response(resample(PLANT, 1 / rate, "damped cosine", sine), 30)
     np.testing.assert_allclose(found, truth, atol=1e-9 * np.abs(truth).max())  # slow gain 200

@@ -170,7 +170,7 @@ def test_a_new_module_is_found_and_handed_on_without_being_listed(tmp_path, monk
 
 
 def test_a_drawing_is_tried_with_every_parameter_set_of_its_machine(monkeypatch):
-    other = replace(face_mill.EIGHT_TEETH, feed_per_turn=0.4e-3)
+    other = replace(face_mill.TSAO_PONG1991, feed_per_turn=0.4e-3)
     monkeypatch.setattr(face_mill, "ANOTHER2030", other, raising=False)
     found = layouts.discover().keys() - LAYOUTS.keys()
     assert found == {"draw_angle_loop, ANOTHER2030", "draw_face_mill_setup, ANOTHER2030"}
@@ -403,7 +403,7 @@ def test_only_the_cut_closes_a_dashed_loop():
 @pytest.mark.parametrize(("samples", "step"), [(5, "9°"), (15, "3°")])
 def test_the_loop_holds_and_samples_at_the_step_of_the_machine(samples, step):
     _, ax = plt.subplots()
-    pictures.draw_angle_loop(ax, replace(face_mill.EIGHT_TEETH, samples_per_pitch=samples))
+    pictures.draw_angle_loop(ax, replace(face_mill.TSAO_PONG1991, samples_per_pitch=samples))
     assert [t for t in words(ax) if step in t] == [f"hold {step}", f"sampled\nevery {step}"]
 
 
@@ -504,7 +504,7 @@ def test_a_profile_longer_than_the_cutter_is_refused():
 
 # --- the face mill -------------------------------------------------------------------------------
 
-MILL = face_mill.EIGHT_TEETH
+MILL = face_mill.TSAO_PONG1991
 CUT = facing.Cutter(MILL)
 INSERTS = np.arange(1, 9)
 
@@ -756,3 +756,45 @@ def test_the_first_four_curves_stand_out_from_white_paper():
 def test_fonts_are_those_that_ship_with_matplotlib():
     assert plt.rcParams["font.sans-serif"] == ["DejaVu Sans"]
     assert plt.rcParams["mathtext.fontset"] == "dejavusans"
+
+
+# --- runs side by side, and tables ---------------------------------------------------------------
+
+
+def test_cuts_stand_side_by_side_under_their_names():
+    runs = [face_mill.simulate(face_mill.Experiment(MILL, turns=n, substeps=1)) for n in (1, 2)]
+    _, axes = plt.subplots(4, 2)
+    pictures.draw_cuts(axes, {"one": runs[0], "two": runs[1]})
+    where = plt.rcParams["axes.titlelocation"]
+    assert [ax.get_title(where) for ax in axes[0]] == ["one", "two"]
+    for column, run in zip(axes.T, runs, strict=True):
+        np.testing.assert_array_equal(column[2].lines[0].get_ydata(), run.current)
+    assert axes[0, 0].get_ylabel() and not axes[0, 1].get_ylabel()
+    with pytest.raises(ValueError, match="shorter"):
+        pictures.draw_cuts(axes, {"one": runs[0]})
+    plt.close("all")
+
+
+def test_moments_show_the_largest_force_of_their_time():
+    run = face_mill.simulate(face_mill.Experiment(MILL, turns=3, substeps=8))
+    fig, axes = plt.subplots(1, 2)
+    pictures.draw_moments(axes, run, 3, (0.25, 0.5), 300)
+    for ax, moment in zip(axes, (0.25, 0.5), strict=True):
+        now = round((2 + moment) * 320) + 1  # 320 steps per turn; a turn begins behind its start
+        assert ax.get_title("center") == f"{run.force[now]:.0f} N"
+    plt.close(fig)
+
+
+def test_lines_carry_their_labels():
+    _, ax = plt.subplots()
+    assert pictures.draw_lines(ax, [1, 2], {"a": [3, 4], "b": [5, 6]}, ylabel="force (N)") is ax
+    assert [line.get_label() for line in ax.lines] == ["a", "b"]
+    assert ax.lines[1].get_ydata().tolist() == [5, 6] and ax.get_ylabel() == "force (N)"
+    plt.close("all")
+
+
+def test_a_table_has_a_row_for_each_name_and_dashes():
+    html = pictures.table({"a": {"x": 1.25, "y": None}, "b": {"x": 2.0, "y": "word"}}, 2).to_html()
+    assert [cell in html for cell in (">1.25<", ">–<", ">2.00<", ">word<", ">a<", ">y<")] == [
+        True
+    ] * 6

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from oracles.signals import loop_settling
 
 from rcbook import signals
 
@@ -81,14 +82,6 @@ def test_random_period_has_zero_mean_and_the_asked_amplitude(seed, period):
 
 
 # ---- measures ----
-
-
-def loop_settling(y, target, band, dt):
-    """The definition, read aloud: try every sample as the first settled one."""
-    for k in range(len(y)):
-        if all(abs(value - target) <= band for value in y[k:]):
-            return k * dt
-    return np.inf
 
 
 @pytest.mark.parametrize("seed", SEEDS)

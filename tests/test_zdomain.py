@@ -1,9 +1,6 @@
 """Zero-phase inverse, zero split, zero-order hold and Q filters against other algorithms."""
 
-import decimal
 import math
-from decimal import Decimal
-from fractions import Fraction
 
 import control
 import numpy as np
@@ -12,6 +9,15 @@ import scipy.integrate
 import scipy.linalg
 import scipy.optimize
 import scipy.signal
+from oracles.zdomain import (
+    exponential_series,
+    from_roots,
+    interval_integrals,
+    peak_square,
+    two_lags,
+    value,
+    with_integral,
+)
 
 from rcbook import zdomain
 from rcbook.zdomain import NoncausalFilter, Plant
@@ -33,14 +39,6 @@ def random_roots(rng, count, low, high):
     return np.array(roots)
 
 
-def from_roots(roots):
-    """Monic polynomial, term by term and without np.poly."""
-    p = [1.0 + 0j]
-    for root in roots:
-        p = [a - root * b for a, b in zip([*p, 0], [0, *p], strict=True)]
-    return np.array(p).real
-
-
 def random_case(seed, order=None):
     """A plant with known zeros inside 0.8 and outside 1.1, and its true B-."""
     rng = np.random.default_rng(seed)
@@ -52,27 +50,6 @@ def random_case(seed, order=None):
     b = gain * np.convolve(from_roots(inner), from_roots(outer))
     a = from_roots(random_roots(rng, order, 0.05, 0.97))
     return Plant(b, a, int(rng.integers(0, 4)), 0.01), from_roots(outer)
-
-
-def value(p, z):
-    """p(z^-1) by powers, not by Horner's rule."""
-    return sum(c * z ** (-float(i)) for i, c in enumerate(p))
-
-
-def peak_square(p):
-    """Maximum of |p|^2 on the circle: a dense grid, then a bounded search round its top."""
-    w = np.linspace(0, np.pi, 4001)
-
-    def negative(x):
-        return -(abs(value(p, np.exp(1j * x))) ** 2)
-
-    best = max(-negative(w))
-    for x in w[np.argsort(negative(w))[:3]]:
-        found = scipy.optimize.minimize_scalar(
-            negative, bounds=(x - 1e-3, x + 1e-3), method="bounded", options={"xatol": 1e-10}
-        )
-        best = max(best, -found.fun)
-    return best
 
 
 # ---- zero-phase inverse ----
@@ -426,25 +403,12 @@ def stable_system(seed, order=None):
     return control.ss(a, rng.normal(size=(order, 1)), rng.normal(size=(1, order)), 0)
 
 
-def with_integral(system):
-    """The system and, as its last state, the integral of its output."""
-    n = system.nstates
-    a = np.block([[system.A, np.zeros((n, 1))], [system.C, np.zeros((1, 1))]])
-    return a, np.append(system.B, [[0]], axis=0)
-
-
 @pytest.mark.parametrize("dt", [0.02, 0.3])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_interval_integral_answers_as_the_matrix_exponential_does(seed, dt):
     system = stable_system(seed)
-    a, b = with_integral(system)
-    whole = scipy.linalg.expm(dt * np.block([[a, b], [np.zeros((1, len(a) + 1))]]))
     u = np.random.default_rng(seed).standard_normal(30)
-    state, integrals = np.zeros(len(a)), []
-    for value in u:
-        after = (whole @ [*state, value])[:-1]
-        integrals.append(after[-1] - state[-1])
-        state = after
+    integrals = interval_integrals(system, dt, u)
     plant = zdomain.interval_integral(system, dt)
     assert plant.delay == 1 and plant.dt == dt
     ours = scipy.signal.lfilter(plant.numerator, plant.a, np.append(u, 0))[1:]
@@ -465,23 +429,6 @@ def test_interval_integral_is_the_hold_of_the_integrated_plant_without_its_pole_
     np.testing.assert_allclose(np.convolve(plant.a, [1, -1]), held.a, atol=1e-10)
     # the hold sums products of its impulse response, which cancel
     np.testing.assert_allclose(plant.b, held.b, atol=1e-10 * np.abs(held.b).max())
-
-
-def two_lags(fast, slow, dt):
-    """1/((s + fast)(s + slow)) held and integrated: b and a by its closed form in 80 digits."""
-    with decimal.localcontext(prec=80):
-        rates, dt = [Decimal(fast), Decimal(slow)], Decimal(dt)
-        gains = [1 / (rates[1] - rates[0]), 1 / (rates[0] - rates[1])]
-        decays = [(-p * dt).exp() for p in rates]
-        # a lag g/(s + p): g/p (1 - e^-pt), integrated g/p (t - (1 - e^-pt)/p)
-        at_once = [g / p * (dt - (1 - e) / p) for g, p, e in zip(gains, rates, decays, strict=True)]
-        later = [g / p**2 * (1 - e) ** 2 for g, p, e in zip(gains, rates, decays, strict=True)]
-        b = [
-            sum(at_once),
-            sum(later) - sum(at_once) * sum(decays),
-            sum(at_once) * decays[0] * decays[1] - later[0] * decays[1] - later[1] * decays[0],
-        ]
-        return [float(x) for x in b], [1.0, -float(sum(decays)), float(decays[0] * decays[1])]
 
 
 @pytest.mark.parametrize("fast, slow, dt", [(800, 2, "0.15"), (300, 40, "0.2"), (3, 1, "0.1")])
@@ -516,16 +463,6 @@ def test_modes_add_up_to_the_frequency_response(seed):
     np.testing.assert_allclose(found, truth, atol=1e-11 * np.abs(residues).max())
     wrong = np.sum(residues / (s[:, None] - 1.01 * poles), axis=-1)
     assert np.abs(wrong - truth).max() > 1e-4 * np.abs(truth).max()
-
-
-def exponential_series(x, first):
-    """sum of x^k/(k + first)! in exact fractions of the complex number x."""
-    re, im = Fraction(x.real), Fraction(x.imag)
-    power, total = (Fraction(1), Fraction(0)), [Fraction(0), Fraction(0)]
-    for k in range(60):
-        total = [t + p / math.factorial(k + first) for t, p in zip(total, power, strict=True)]
-        power = (power[0] * re - power[1] * im, power[0] * im + power[1] * re)
-    return complex(*map(float, total))
 
 
 TURNS = [1, -1, 1j, 0.6 + 0.8j, -0.8 + 0.6j]
@@ -618,3 +555,28 @@ def test_turns_round_the_origin_refuses_a_curve_through_it():
         zdomain.turns_round_origin(lambda x: x - 0.3 + 0j, 0.0, 1.0, 7)
     with pytest.raises(ValueError, match="NaN or infinity"):
         zdomain.turns_round_origin(lambda x: np.full(x.size, np.nan), 0.0, 1.0, 7)
+
+
+# ---- where something stops being true ----
+
+
+@pytest.mark.parametrize("inside, outside", [(0.0, 3.0), (2.0, -3.0), (1.0, 9e3)])
+@pytest.mark.parametrize("precision", [0.1, 1e-9])
+def test_the_boundary_is_a_root_from_the_inside(inside, outside, precision):
+    """x^2 < 2 ends at +-sqrt 2; what is found holds, and a step of the precision farther not."""
+    inside = min(inside, 1.0)
+    found = zdomain.boundary(lambda x: x * x < 2, inside, outside, precision)
+    further = found + math.copysign(precision, outside - inside)
+    assert found * found < 2 <= further * further
+
+
+def test_the_boundary_is_no_farther_than_asked_and_begins_where_it_holds():
+    assert zdomain.boundary(lambda x: True, 1.0, 1.0, 1e-3) == 1.0
+    assert 2 - 1e-3 <= zdomain.boundary(lambda x: True, 1.0, 2.0, 1e-3) < 2
+    with pytest.raises(ValueError, match=r"does not hold at inside = 3\.0; begin where"):
+        zdomain.boundary(lambda x: x < 2, 3.0, 9.0, 1e-3)
+    for bad in (np.nan, np.inf):
+        with pytest.raises(ValueError, match="inside = "):
+            zdomain.boundary(lambda x: True, bad, 1.0, 1e-3)
+    with pytest.raises(ValueError, match=r"precision = 0\.0"):
+        zdomain.boundary(lambda x: x < 2, 1.0, 9.0, 0.0)

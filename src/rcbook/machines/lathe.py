@@ -59,9 +59,9 @@ def _product(coefficients: tuple[complex, ...]) -> np.ndarray:
     return np.real(product)
 
 
-ELECTRIC_SERVO = Servo(0.14, (0.77, 2.43), (0.14, -0.15 + 0.15j, -0.15 - 0.15j), 0.01)  # eq. 13
-NC_LATHE = Servo(0.046, (3.0,), (-0.6 + 0.15j, -0.6 - 0.15j), 0.01)  # eq. 21
-MISJUDGED = (1.25, 0.75)  # estimate over truth in figs 12 and 13
+LEE_OH_KIM = Servo(0.14, (0.77, 2.43), (0.14, -0.15 + 0.15j, -0.15 - 0.15j), 0.01)  # eq. 13
+LEE_OH_KIM_NC = Servo(0.046, (3.0,), (-0.6 + 0.15j, -0.6 - 0.15j), 0.01)  # eq. 21
+LEE_OH_KIM_MISJUDGED = (1.25, 0.75)  # estimate over truth in figs 12 and 13
 
 
 def samples_per_turn(speed: float, dt: float) -> float:

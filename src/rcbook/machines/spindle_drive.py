@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 
 import control
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rcbook.zdomain import real_number
 
@@ -127,3 +128,27 @@ def in_angle(system: control.StateSpace, speed: float) -> control.StateSpace:
     return control.ss(
         system.A / speed, system.B / speed, system.C, system.D, inputs=system.input_labels, **labels
     )
+
+
+def runge_kutta(
+    drive: SpindleDrive, inputs: ArrayLike, step: float, start: ArrayLike
+) -> np.ndarray:
+    """States after every step in the shaft angle by the classical fourth-order method.
+
+    `inputs` has a row of speed command (V) and torque (N m), held over the step, for each; `step`
+    is an angle in rad, `start` the five states before.  It is the wrong method for so stiff a
+    drive, and here to show how it goes wrong: nothing warns of a step that is too long.
+    Raises ValueError for inputs without two columns and a step that is not positive.
+    """
+    inputs, state = np.asarray(inputs, dtype=float), np.asarray(start, dtype=float)
+    step, system = real_number(step, "step", positive=True), speed_driven(drive)
+    if inputs.ndim != 2 or inputs.shape[1] != 2:
+        raise ValueError(f"inputs have shape {inputs.shape}; give a row of command and torque each")
+    states = np.empty((len(inputs), state.size))
+    for k, u in enumerate(inputs):
+        stages = [np.zeros(state.size)]
+        for share in (0, 0.5, 0.5, 1):
+            now = state + share * step * stages[-1]
+            stages.append((system.A @ now + system.B @ u) / now[0])
+        states[k] = state = state + step / 6 * (np.array([1, 2, 2, 1]) @ stages[1:])
+    return states

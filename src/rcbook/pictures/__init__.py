@@ -10,15 +10,24 @@ import pkgutil
 from collections.abc import Callable, Iterable
 
 from rcbook.pictures.blocks import Block, Frame, Node, Sum, Wire, path, row
-from rcbook.pictures.results import GREY, LABELS, mark_revolutions, use_style
+from rcbook.pictures.results import GREY, LABELS, mark_revolutions, table, use_style
 from rcbook.pictures.sketch import Sketch
 
 
 def drawings(folders: Iterable[str]) -> dict[str, Callable]:
-    """Every `draw_` function of the modules in these folders, by name."""
-    found = (importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(folders))
-    members = (pair for module in found for pair in vars(module).items())
-    return {name: draw for name, draw in members if name.startswith("draw_")}
+    """Every `draw_` function of the modules in these folders, by name.
+
+    Raises ValueError when two modules have different ones of the same name.
+    """
+    modules = (
+        importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(folders)
+    )
+    found: dict[str, Callable] = {}
+    for module in modules:
+        for name, draw in vars(module).items():
+            if name.startswith("draw_") and found.setdefault(name, draw) is not draw:
+                raise ValueError(f"{module.__name__}.{name} is taken; call it otherwise")
+    return found
 
 
 globals().update(drawings(__path__))

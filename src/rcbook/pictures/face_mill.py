@@ -1,6 +1,6 @@
 """Face milling seen along the spindle axis, and plots of its runs, its teeth and its chips."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,7 +8,8 @@ from matplotlib.patches import Circle, Polygon
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-from rcbook.machines.face_mill import EIGHT_TEETH, FaceMill, Run
+from rcbook.machines import face_mill
+from rcbook.machines.face_mill import TSAO_PONG1991, FaceMill, Run
 from rcbook.pictures.results import AXES, GREY, bare_polar
 from rcbook.pictures.sketch import DISTURBED, FOCUS, PLANT, STEEL, THIN, TOOL, Sketch, about
 
@@ -22,7 +23,7 @@ INSERT = ((0.0, 0.0), (-0.08, -0.62), (-0.5, -0.58), (-0.42, -0.14))  # along, o
 BODY = np.radians([-2, 0, 6, 14, 22, 43]), (2.3, 1.85, 1.8, 1.95, 2.3, 2.3)  # from insert to insert
 
 
-def draw_face_mill_setup(ax: Axes, mill: FaceMill = EIGHT_TEETH) -> Axes:
+def draw_face_mill_setup(ax: Axes, mill: FaceMill = TSAO_PONG1991) -> Axes:
     """Draw face milling of a full slot along the spindle axis: inserts, chips, runout and force.
 
     A tooth enters at the top and leaves at the bottom; feed and runout are exaggerated alike.
@@ -154,6 +155,35 @@ def draw_teeth(
     ax.set_rmin(0)
     ax.set_rorigin(-0.4 * reference)  # a hub, so that the bars do not crowd in the middle
     return ax
+
+
+def draw_cuts(axes: np.ndarray, runs: Mapping[str, Run]) -> None:
+    """Plot runs side by side, each as `draw_cut` has it on a column of four axes under its name.
+
+    Raises ValueError when there is not a column for each run.
+    """
+    for column, (name, run) in zip(axes.T, runs.items(), strict=True):
+        draw_cut(column, run)
+        column[0].set_title(name)
+    for ax in axes[:, 1:].ravel():
+        ax.set_ylabel("")
+
+
+def draw_moments(
+    axes: Sequence[Axes], run: Run, turn: int, moments: Sequence[float], magnified: float
+) -> None:
+    """Draw the chips, as `draw_cutter_chips` has them, at moments in parts of a turn.
+
+    Titles are the largest tooth force then.
+    """
+    mill, forces = run.experiment.mill, face_mill.tooth_forces(run)
+    stiffness = mill.cutting_coefficient * mill.depth
+    for ax, moment in zip(axes, moments, strict=True):
+        now = run.during(turn).start + round(moment * run.experiment.steps_per_turn)
+        angles = 2 * np.pi * (run.turns[now] - np.arange(mill.teeth) / mill.teeth)
+        chips = forces[now] / stiffness
+        draw_cutter_chips(ax, angles, chips, mill.diameter / 2, magnified, mill.tooth_feed)
+        ax.set_title(f"{forces[now].max():.0f} N", loc="center")
 
 
 def draw_cutter_chips(

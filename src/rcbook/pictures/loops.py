@@ -4,8 +4,9 @@ from collections.abc import Sequence
 
 from matplotlib.axes import Axes
 
-from rcbook.machines.face_mill import EIGHT_TEETH, FaceMill
-from rcbook.machines.spindle_drive import TSAO_PONG1991, SpindleDrive
+from rcbook.machines import face_mill, spindle_drive
+from rcbook.machines.face_mill import FaceMill
+from rcbook.machines.spindle_drive import SpindleDrive
 from rcbook.pictures import blocks
 from rcbook.pictures.blocks import Block, Frame, Node, Sum, Wire, path, row
 from rcbook.pictures.sketch import DISTURBED, FOCUS, PAPER, PLANT
@@ -83,7 +84,7 @@ def draw_repetitive_generator(ax: Axes) -> Axes:
     return blocks.draw_block_diagram(ax, items, wires)
 
 
-def draw_spindle_drive(ax: Axes, drive: SpindleDrive = TSAO_PONG1991) -> Axes:
+def draw_spindle_drive(ax: Axes, drive: SpindleDrive = spindle_drive.TSAO_PONG1991) -> Axes:
     """Draw the cascade of a spindle drive, from speed command to speed, and the cut as its load."""
     tall, limit = {"height": 1.4}, {"title": "current limit", "icon": blocks.LIMITED}
     proportional = r"$K_{pv}+\dfrac{K_{iv}}{s}$"
@@ -121,7 +122,7 @@ def draw_spindle_drive(ax: Axes, drive: SpindleDrive = TSAO_PONG1991) -> Axes:
     return blocks.draw_block_diagram(ax, items, wires)
 
 
-def draw_angle_loop(ax: Axes, mill: FaceMill = EIGHT_TEETH) -> Axes:
+def draw_angle_loop(ax: Axes, mill: FaceMill = face_mill.TSAO_PONG1991) -> Axes:
     """Draw the repetitive loop that samples at equal steps of the cutter's turn."""
     step, size = f"{360 / mill.samples_per_turn:g}°", {"width": 2.0, "height": 1.5}
     items = [

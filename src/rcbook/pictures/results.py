@@ -5,8 +5,10 @@ from importlib import resources
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
+from pandas.io.formats.style import Styler
 
 from rcbook.loops.repetitive import Run
 from rcbook.zdomain import Plant
@@ -106,3 +108,16 @@ def bare_polar(ax: Axes, spokes: Mapping[str, float], rings: Sequence[float] = (
     ax.set_yticks(rings, [""] * len(rings))
     ax.spines["polar"].set_visible(False)
     ax.spines["inner"].set_linewidth(0)  # drawing makes it visible again
+
+
+def draw_lines(ax: Axes, x: ArrayLike, lines: Mapping[str, ArrayLike], **settings) -> Axes:
+    """Plot curves over the same x, each under its label; the settings are those of `Axes.set`."""
+    for label, y in lines.items():
+        ax.plot(x, y, label=label)
+    ax.set(**settings)
+    return ax
+
+
+def table(rows: Mapping[str, Mapping], decimals: int = 1) -> Styler:
+    """Named rows as a table with so many decimals, and a dash for what does not exist."""
+    return pd.DataFrame(rows).T.style.format(precision=decimals, na_rep="–")

@@ -41,6 +41,7 @@ from rcbook.zdomain.sampling import (
     phi2,
     zero_order_hold,
 )
+from rcbook.zdomain.search import boundary
 
 __all__ = [
     "NORMALISATIONS",
@@ -49,6 +50,7 @@ __all__ = [
     "add",
     "at_frequency",
     "binomial_q",
+    "boundary",
     "evaluate",
     "interval_integral",
     "modes",

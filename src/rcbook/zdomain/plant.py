@@ -58,6 +58,11 @@ class Plant:
         return shift(self.b, self.delay)
 
     @property
+    def denominator(self) -> np.ndarray:
+        """a(z^-1), under the name that controllers have for it."""
+        return self.a
+
+    @property
     def is_stable(self) -> bool:
         """Whether every pole lies inside the unit circle."""
         return bool(np.all(np.abs(self.poles) < 1 - _ON_CIRCLE))
