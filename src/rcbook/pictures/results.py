@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
-from rcbook.loops.repetitive import Run
+from rcbook.loops.run import Run
 from rcbook.machines import face_mill
 from rcbook.machines.peripheral_mill import PeripheralMill
 from rcbook.zdomain import Plant
@@ -21,8 +21,8 @@ LABELS = {
     "output": "force",
     "command": "feed command",
     "repetitive": "repetitive command",
-    "error": "error seen by the repetitive controller",
-    "inner_error": "error seen by the PI controller",
+    "error": "error",
+    "measured_error": "error seen by the repetitive controller",
 }
 GREY = "0.55"
 
