@@ -82,7 +82,7 @@ WAY = (  # rows of stations; all of a row hand on to all of the next
     ],
     [Station("loop", "a loop round the plant", ("rcbook.loops.repetitive:Loop",), "loop")],
     [
-        Station("verdict", "is it stable?", ("rcbook.loops.repetitive:stability",), "verdict"),
+        Station("verdict", "is it stable?", ("rcbook.loops.repetitive:verdict",), "verdict"),
         Station("run", "what does it do?", ("rcbook.loops.repetitive:simulate",), "signals"),
     ],
     [Station("ledger", "what is printed, and ours", ("rcbook.ledger:Ledger.check",))],
