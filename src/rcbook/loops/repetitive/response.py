@@ -77,28 +77,29 @@ def simulate(
     y, e, u, v, inner, sent, kept_u, kept_v, asked_u, asked_v = np.zeros((10, r.size))
     bound = _bound(inputs)
 
-    def recall(p: np.ndarray, s: np.ndarray, k: int, first: int = 0) -> float:
-        return p[first:] @ s[k - p.size + 1 : k - first + 1][::-1]
-
     for k in range(lags, r.size):
-        y[k] = recall(b, sent, k) - recall(a, y, k, 1)
+        y[k] = _recall(b, sent, k) - _recall(a, y, k, 1)
         measured = y[k] + noise[k]
         e[k] = r[k] - measured
-        asked = recall(ng, e, k) + recall(through, r, k) - recall(dg, kept_u, k, 1)
+        asked = _recall(ng, e, k) + _recall(through, r, k) - _recall(dg, kept_u, k, 1)
         asked_u[k] = asked / dg[0]
         u[k] = np.clip(asked_u[k], -limits.repetitive.value, limits.repetitive.value)
         inner[k] = u[k] - feedback * measured
-        asked_v[k] = (recall(n, inner, k) - recall(c, kept_v, k, 1)) / c[0]
+        asked_v[k] = (_recall(n, inner, k) - _recall(c, kept_v, k, 1)) / c[0]
         v[k] = np.clip(asked_v[k], -limits.command.value, limits.command.value)
         kept_u[k] = u[k] if limits.repetitive.remember_clipped else asked_u[k]
         kept_v[k] = v[k] if limits.command.remember_clipped else asked_v[k]
         sent[k] = v[k] + w[k]
         if not max(abs(y[k]), abs(u[k]), abs(v[k])) <= bound:
             break
-    asked = (asked_v[lags:], limits.command.value), (asked_u[lags:], limits.repetitive.value)
-    return _run(
-        loop, inputs, (y[lags:], v[lags:], u[lags:]), *(np.abs(s) > most for s, most in asked)
-    )
+    asked = ((asked_v, limits.command.value), (asked_u, limits.repetitive.value))
+    acted = (np.abs(s[lags:]) > most for s, most in asked)
+    return _run(loop, inputs, (y[lags:], v[lags:], u[lags:]), *acted)
+
+
+def _recall(p: np.ndarray, s: np.ndarray, k: int, first: int = 0) -> float:
+    """p(z^-1) s at sample k, without the `first` powers."""
+    return p[first:] @ s[k - p.size + 1 : k - first + 1][::-1]
 
 
 def respond(
