@@ -1,0 +1,1 @@
+"""Expected values by other ways than the library's, one module for each module of tests."""
