@@ -46,7 +46,7 @@ def verdicts() -> None:
         once = periodic.one_period_map(loop)
         state = np.ones(once.shape[0])
         each = seconds(lambda once=once, state=state: once @ state)
-        energy = seconds(lambda loop=loop: periodic.decide(loop))
+        energy = seconds(lambda loop=loop: periodic.verdict(loop))
         counted = seconds(lambda loop=loop: periodic.count_outside(loop))
         print(f"{n:6d}: by energy {energy / each:8.0f}, by counting {counted / each:8.0f}")
 

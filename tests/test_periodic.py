@@ -6,19 +6,45 @@ from dataclasses import replace
 import control
 import numpy as np
 import pytest
-import scipy.linalg
 import scipy.signal
+from oracles.periodic import (
+    BAR,
+    by_definition,
+    closed_form_modes,
+    embeddings,
+    matrix_by_definition,
+    sizes,
+    stationary_variance,
+    window_of_k,
+)
 
 from rcbook import zdomain
 from rcbook.loops import periodic
-from rcbook.loops.periodic import Compensator, PeriodicLoop, PeriodicPlant
+from rcbook.loops.periodic import (
+    Compensator,
+    Limit,
+    Limits,
+    Memory,
+    PeriodicLoop,
+    PeriodicPlant,
+    odd_harmonic,
+    plain,
+    several,
+)
 from rcbook.machines import boring_bar
 
-BAR = boring_bar.HANSON_TSAO2000
 Q20 = zdomain.symmetric_fir([0.8, 0.1])
 Q21 = zdomain.binomial_q()
 SEEDS = range(4)
 each_seed = pytest.mark.parametrize("seed", SEEDS)
+MEMORIES = {  # of a loop of n samples with a plain memory
+    "its own": lambda memory, n: memory,
+    "twice": lambda memory, n: several(memory, memory),
+    "odd harmonics of two periods": lambda memory, n: odd_harmonic(2 * n, Q20),
+    "no whole period": lambda memory, n: plain(n - 0.3),
+    "within the period": lambda memory, n: plain(4),
+}
+each_memory = pytest.mark.parametrize("kind", MEMORIES)
 
 
 def bar_intervals(n, gamma):
@@ -29,11 +55,11 @@ def bar_loop(n, gamma, design="scheduled", q=(1.0,), gain=1.0):
     intervals = bar_intervals(n, gamma)
     designed_for = bar_intervals(n, 0.0) if design == "nominal" else intervals
     compensator = periodic.zero_phase(BAR.plant, designed_for)
-    return PeriodicLoop(periodic.sample(BAR.plant, intervals), compensator, q, gain)
+    return PeriodicLoop(periodic.sample(BAR.plant, intervals), compensator, plain(n, q), gain)
 
 
 def random_loop(seed, n=None, gain=0.6):
-    """A loop of no particular merit: random plant, taps, advance and q of its own per sample."""
+    """A loop of no particular merit: random plant, taps, advance, and a q without symmetry."""
     rng = np.random.default_rng(seed)
     order, half = int(rng.integers(1, 4)), int(rng.integers(0, 3))
     n = int(rng.integers(9, 20)) if n is None else n
@@ -45,62 +71,31 @@ def random_loop(seed, n=None, gain=0.6):
     )
     plant = periodic.sample(system, rng.uniform(0.1, 1.5, n))
     taps, advance = rng.standard_normal((n, int(rng.integers(1, 6)))), int(rng.integers(1, 4))
-    q = rng.uniform(0, 1, (n, 2 * half + 1))
-    return PeriodicLoop(plant, Compensator(taps, advance), q / q.sum(axis=1, keepdims=True), gain)
+    q = rng.uniform(0, 1, 2 * half + 1)
+    return PeriodicLoop(plant, Compensator(taps, advance), Memory(q / q.sum(), n - half, n), gain)
+
+
+def remembering(loop, kind):
+    return replace(loop, memory=MEMORIES[kind](loop.memory, loop.period))
+
+
+def in_order(signal):
+    """A dictionary of time as a row from time 0 on."""
+    return np.array([signal[k] for k in range(max(signal) + 1)])
+
+
+def solved(run):
+    return run.output, run.repetitive, run.command
 
 
 # ---- the definition, sample by sample ----
 
 
-def by_definition(loop, drive, x=None, u=None, w=None):
-    """x, u, w as dictionaries of time and y as a row, from the equations at the head of the
-    module; u and w map past times to values, zero where they say nothing."""
-    plant, n, half = loop.plant, loop.period, loop.half
-    u, w = dict(u or {}), dict(w or {})
-    x = np.zeros(plant.order) if x is None else x
-    states, y = {0: x}, []
-    for k, driven in enumerate(drive):
-        i = k % n
-        y.append(plant.c @ x)
-        u[k] = sum(
-            loop.q[i, half + j] * w.get(k - n + loop.advance + j, 0.0)
-            for j in range(-half, half + 1)
-        )
-        w[k] = u.get(k - loop.advance, 0.0) + driven - y[-1]
-        taps = loop.compensator.taps[i]
-        v = loop.gain * sum(tap * u.get(k - j, 0.0) for j, tap in enumerate(taps))
-        x = plant.a[i] @ x + plant.b[i] * v
-        states[k + 1] = x
-    return states, u, w, np.array(y)
-
-
-def sizes(loop):
-    """n, reach and memory of the state as `one_period_map` documents it."""
-    reach = max(loop.advance, loop.compensator.taps.shape[1] - 1)
-    return loop.plant.order, reach, loop.period - loop.advance + loop.half
-
-
-def from_state(loop, state, drive):
-    order, reach, memory = sizes(loop)
-    u = {i - reach: value for i, value in enumerate(state[order : order + reach])}
-    w = {i - memory: value for i, value in enumerate(state[order + reach :])}
-    return by_definition(loop, drive, state[:order], u, w)
-
-
-def matrix_by_definition(loop):
-    order, reach, memory = sizes(loop)
-    n, columns = loop.period, []
-    for unit in np.eye(order + reach + memory):
-        x, u, w, _ = from_state(loop, unit, np.zeros(n))
-        after = [u[j] for j in range(n - reach, n)] + [w[j] for j in range(n - memory, n)]
-        columns.append(np.concatenate([x[n], after]))
-    return np.array(columns).T
-
-
 @each_seed
+@each_memory
 @pytest.mark.parametrize("n", [None, 7])  # 7: shorter than what some loops remember of u
-def test_one_period_map_is_the_recursion(seed, n):
-    loop = random_loop(seed, n)
+def test_one_period_map_is_the_recursion(seed, kind, n):
+    loop = remembering(random_loop(seed, n), kind)
     expected = matrix_by_definition(loop)
     operator = periodic.one_period_map(loop)
     scale = np.abs(expected).max()
@@ -114,25 +109,49 @@ def test_one_period_map_is_the_recursion(seed, n):
 
 
 @each_seed
-def test_simulation_is_the_recursion(seed):
-    loop = random_loop(seed, gain=0.1)
-    rng = np.random.default_rng(seed)
-    r, noise = rng.standard_normal((2, 5 * loop.period))
-    _, u, _, y = by_definition(loop, r - noise)
-    run = periodic.simulate(loop, r, noise)
-    expected = np.array([u[k] for k in range(r.size)])
+@each_memory
+def test_simulation_is_the_recursion(seed, kind):
+    loop = remembering(random_loop(seed, gain=0.1), kind)
+    r, d, noise = np.random.default_rng(seed).standard_normal((3, 5 * loop.period + 3))
+    _, u, _, v, y = by_definition(loop, r - noise, disturbance=d)
+    run = periodic.simulate(loop, r, disturbance=d, noise=noise)
     assert not run.unbounded
-    np.testing.assert_allclose(run.output, y, atol=1e-12 * np.abs(y).max())
-    np.testing.assert_allclose(run.repetitive, expected, atol=1e-12 * np.abs(expected).max())
-    np.testing.assert_allclose(run.error, r - run.output)
-    taps = loop.gain * loop.compensator.taps
-    command = [
-        sum(tap * u.get(k - j, 0.0) for j, tap in enumerate(taps[k % loop.period]))
-        for k in range(r.size)
-    ]
-    np.testing.assert_allclose(run.command, command, atol=1e-12 * np.abs(command).max())
+    assert run.command_clipped == run.repetitive_clipped == 0
+    for found, expected in zip(solved(run), (y, in_order(u), in_order(v)), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
+    np.testing.assert_array_equal(run.error, r - run.output)
+    np.testing.assert_array_equal(run.measured_error, r - run.output - noise)
+    np.testing.assert_array_equal(run.disturbance, d)
     assert run.time[0] == 0
-    np.testing.assert_allclose(np.diff(run.time), run.intervals[:-1], rtol=1e-9)
+    np.testing.assert_allclose(
+        np.diff(run.time), np.resize(loop.plant.intervals, r.size)[:-1], rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize("remember", [True, False])
+@pytest.mark.parametrize("kind", ["command", "repetitive"])
+def test_limits_clip_sample_by_sample(kind, remember):
+    """Half of what the free run reaches; the memory goes on from the clipped u, or from u."""
+    loop = random_loop(3, gain=0.1)
+    r, d = np.random.default_rng(1).standard_normal((2, 6 * loop.period))
+    free = periodic.simulate(loop, r, disturbance=d)
+    limit = Limit(0.5 * np.abs(getattr(free, kind)).max(), remember)
+    _, u, _, v, y = by_definition(loop, r, disturbance=d, **{kind: limit})
+    run = periodic.simulate(loop, r, disturbance=d, limits=Limits(**{kind: limit}))
+    for found, expected in zip(solved(run), (y, in_order(u), in_order(v)), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
+    assert np.abs(getattr(run, kind)).max() == limit.value
+    clipped = {"command": run.command_clipped, "repetitive": run.repetitive_clipped}
+    assert clipped.pop(kind) == np.sum(np.abs(getattr(run, kind)) == limit.value) > 3
+    assert list(clipped.values()) == [0]
+    assert np.abs(run.output - free.output).max() > 1e-3
+
+
+def test_a_limit_that_is_never_met_changes_nothing():
+    loop, r = random_loop(1, gain=0.1), np.random.default_rng(1).standard_normal(50)
+    free = periodic.simulate(loop, r)
+    far = periodic.simulate(loop, r, limits=Limits(command=Limit(1e6), repetitive=Limit(1e6)))
+    np.testing.assert_allclose(far.output, free.output, atol=1e-13 * np.abs(free.output).max())
 
 
 # ---- plants ----
@@ -178,7 +197,7 @@ def test_rows_of_taps_are_used_when_they_say():
 def test_zero_phase_design_makes_every_frozen_plant_real_and_not_negative(gamma):
     loop = bar_loop(12, gamma)
     z = zdomain.unit_circle(64)
-    gain = 1 - periodic.frozen_symbol(loop, z)
+    gain = 1 - periodic.factor(loop, z)
     assert loop.advance == 6
     assert loop.compensator.taps.shape == (12, 12)
     for k, interval in enumerate(loop.plant.intervals):
@@ -186,7 +205,7 @@ def test_zero_phase_design_makes_every_frozen_plant_real_and_not_negative(gamma)
         expected = np.abs(zdomain.evaluate(b, z)) ** 2 / np.abs(b).sum() ** 2
         np.testing.assert_allclose(gain[k], expected, atol=1e-9)
     late = replace(loop, compensator=replace(loop.compensator, advance=5))
-    assert np.abs((1 - periodic.frozen_symbol(late, z)).imag).max() > 0.5
+    assert np.abs((1 - periodic.factor(late, z)).imag).max() > 0.5
 
 
 def test_scale_of_the_plant_does_not_matter():
@@ -233,35 +252,19 @@ def test_least_squares_solves_the_whole_problem(seed, frozen):
 # ---- the two lifted routes of the paper ----
 
 
-def embeddings(loop):
-    """Maps of the state of `one_period_map` to those of eq. 8 and of eq. A14, from definitions."""
-    order, reach, memory = sizes(loop)
-    n, filter = loop.period, loop.compensator.taps.shape[1] - 1
-    product, appendix = [], []
-    for unit in np.eye(order + reach + memory):
-        _, u, w, _ = from_state(loop, unit, np.zeros(n))
-        past_w = [w[-j] for j in range(1, memory + 1)]
-        past_u = [u[-j] for j in range(1, max(filter, loop.advance) + 1)]
-        x = unit[:order]
-        product.append(np.concatenate([past_w, past_u[: loop.advance], past_u[:filter], x]))
-        appendix.append(np.concatenate([past_u[:filter], x, [u[k] for k in range(n)]]))
-    return np.array(product).T, np.array(appendix).T
-
-
 @each_seed
 def test_product_of_matrices_is_the_one_period_map(seed):
     loop = random_loop(seed)
     into, _ = embeddings(loop)
     matrix, expected = periodic.product_of_matrices(loop), matrix_by_definition(loop)
-    assert len(matrix) == loop.period + loop.half + sum(
-        (loop.plant.order, loop.compensator.taps.shape[1] - 1)
-    )
+    half, filter = loop.memory.taps.size // 2, loop.compensator.taps.shape[1] - 1
+    assert len(matrix) == loop.period + half + loop.plant.order + filter
     np.testing.assert_allclose(matrix @ into, into @ expected, atol=1e-11 * np.abs(expected).max())
 
 
 @each_seed
 def test_appendix_is_the_one_period_map_and_wrong_readings_are_not(seed):
-    loop = replace(random_loop(seed), q=np.ones(1))
+    loop = replace(random_loop(seed), memory=None)
     _, into = embeddings(loop)
     expected = into @ matrix_by_definition(loop)
     tolerance = 1e-11 * np.abs(expected).max()
@@ -336,8 +339,8 @@ def test_count_is_that_of_the_dense_eigenvalues(seed):
 )
 def test_bracket_holds_the_dense_spectral_radius(n, gamma, design, q):
     loop = bar_loop(n, gamma, design, q)
-    low, high = periodic.spectral_radius(loop, 0.05)
-    dense = np.abs(periodic.multipliers(loop)[0])
+    low, high = periodic.radius_bounds(loop, 0.05)
+    dense = periodic.spectral_radius(loop)
     assert low <= dense <= high <= low + 0.05
 
 
@@ -349,28 +352,10 @@ def test_count_finds_the_multipliers_of_an_unstable_design(gamma):
     assert periodic.count_outside(loop).outside == expected
 
 
-def closed_form_modes(n, gain, q):
-    """Modes z of the time-invariant loop, z^N = q (1 - gain |B|^2/b), by fixed-point iteration
-    from the N-th roots of unity; it contracts like 1/N."""
-    b = zdomain.zero_order_hold(periodic.balanced(BAR.plant), BAR.sampling_interval).b
-    z = zdomain.unit_circle(n)
-    for _ in range(30):
-        squared = zdomain.evaluate(b, z) * zdomain.evaluate(b, 1 / z) / np.abs(b).sum() ** 2
-        symbol = zdomain.evaluate(q, z) * z ** float(len(q) // 2) * (1 - gain * squared)
-        # the symbol is all but real: one branch of the logarithm for each sign, no cut nearby
-        logarithm = np.log(np.abs(symbol.real) + 1j * symbol.imag * np.sign(symbol.real))
-        logarithm += 1j * np.pi * (symbol.real < 0)
-        z = np.exp((logarithm + 2j * np.pi * np.arange(n)) / n)
-    return z, symbol
-
-
 def test_the_map_has_the_closed_form_multipliers_of_a_time_invariant_loop():
     """N = 1e5: u(k) = z^k and what follows from it come back z^N times as large."""
     n, gain = 100_000, 0.7
-    intervals = np.full(n, BAR.sampling_interval)
-    loop = PeriodicLoop(
-        periodic.sample(BAR.plant, intervals), periodic.zero_phase(BAR.plant, intervals), Q20, gain
-    )
+    loop = bar_loop(n, 0.0, q=Q20, gain=gain)
     modes, multipliers = closed_form_modes(n, gain, Q20)
     operator = periodic.one_period_map(loop)
     order, reach, memory = sizes(loop)
@@ -391,8 +376,8 @@ def test_count_is_that_of_the_closed_form_at_long_periods():
     outside = np.sum(np.abs(closed_form_modes(n, gain, np.ones(1))[1]) > 1)
     assert outside > 50
     assert periodic.count_outside(loop).outside == outside
-    assert periodic.decide(loop).verdict == "unstable"
-    assert periodic.decide(bar_loop(n, 0.0, gain=1.95)).verdict == "stable"
+    assert periodic.verdict(loop).verdict == "unstable"
+    assert periodic.verdict(bar_loop(n, 0.0, gain=1.95)).verdict == "stable"
 
 
 # ---- bounds ----
@@ -401,30 +386,9 @@ def test_count_is_that_of_the_closed_form_at_long_periods():
 def test_energy_gain_of_a_time_invariant_loop_is_the_peak_of_its_symbol():
     for gain, q in ((0.7, (1.0,)), (1.9, Q20), (2.4, Q21)):
         loop = bar_loop(9, 0.0, q=q, gain=gain)
-        peak = np.abs(periodic.frozen_symbol(loop, zdomain.unit_circle(4000))[0]).max()
+        peak = np.abs(periodic.factor(loop, zdomain.unit_circle(4000))[0]).max()
         bound = periodic.energy_gain(loop, 1e-3)
         assert peak <= bound <= peak + 1.1e-3
-
-
-def window_of_k(loop, samples, span):
-    """Matrix of K on `samples` inputs, with outputs from 9 before to `span` after, from the
-    definition: answer of q (u(k) - y(k+L)) to unit inputs."""
-    plant, n, half = loop.plant, loop.period, loop.half
-    rows = 9 + samples + span
-    matrix = np.zeros((rows, samples))
-    for j in range(samples):
-        y, x = np.zeros(rows + 30), np.zeros(plant.order)
-        for k in range(j, rows + 20 - 9):
-            y[k + 9] = plant.c @ x
-            lag = k - j
-            v = loop.taps[k % n, lag] if lag < loop.taps.shape[1] else 0.0
-            x = plant.a[k % n] @ x + plant.b[k % n] * v
-        inner = -np.roll(y, -loop.advance)
-        inner[9 + j] += 1.0
-        for k in range(-9, rows - 9):
-            terms = range(max(k - half, -9), k + half + 1)
-            matrix[k + 9, j] = sum(loop.q[k % n, half + i - k] * inner[i + 9] for i in terms)
-    return matrix
 
 
 @each_seed
@@ -445,14 +409,14 @@ def test_what_a_bound_calls_stable_is_stable(seed):
     radius = np.abs(np.linalg.eigvals(matrix_by_definition(loop))).max()
     if min(periodic.energy_gain(loop, 0.01), periodic.absolute_gain(loop)) < 1:
         assert radius < 1
-    assert periodic.decide(loop).verdict == ("stable" if radius < 1 else "unstable")
+    assert periodic.verdict(loop).verdict == ("stable" if radius < 1 else "unstable")
 
 
 def test_a_loop_that_rounding_decides_is_undecided():
     """The nominal design at gamma = 0.5: what its dense matrix of N = 512 has as eigenvalues, its
     transpose has not, because the powers grow beyond 1e9 in 20 periods."""
     loop = bar_loop(512, 0.5, "nominal")
-    found = periodic.decide(loop)
+    found = periodic.verdict(loop)
     assert (found.verdict, found.outside) == ("undecided", None)
     assert "undecided (count: " in str(found)
     matrix = periodic.dense(loop)
@@ -462,11 +426,11 @@ def test_a_loop_that_rounding_decides_is_undecided():
 
 
 def test_verdicts_tell_their_grounds():
-    assert periodic.decide(bar_loop(64, 0.3)).method == "energy"
-    counted = periodic.decide(bar_loop(64, 0.15, "nominal"))
+    assert periodic.verdict(bar_loop(64, 0.3)).method == "energy"
+    counted = periodic.verdict(bar_loop(64, 0.15, "nominal"))
     assert (counted.verdict, counted.method, counted.outside) == ("stable", "count", 0)
     assert "points of the half circle" in counted.certificate
-    assert periodic.decide(bar_loop(48, 0.5, "nominal")).outside > 0
+    assert periodic.verdict(bar_loop(48, 0.5, "nominal")).outside > 0
 
 
 def test_a_plant_that_grows_unseen_is_not_called_stable():
@@ -475,7 +439,40 @@ def test_a_plant_that_grows_unseen_is_not_called_stable():
     plant = periodic.sample(hidden, np.full(9, 0.5))
     loop = PeriodicLoop(plant, Compensator(np.full((9, 1), 0.5), 1))
     assert periodic.energy_gain(loop) < 1
-    assert (periodic.decide(loop).verdict, periodic.decide(loop).outside) == ("unstable", 1)
+    found = periodic.verdict(loop)
+    assert (found.verdict, found.method, found.outside) == ("unstable", "count", 1)
+
+
+# ---- verdicts with other memories ----
+
+
+@pytest.mark.parametrize("seed", range(8))
+@each_memory
+def test_the_verdict_is_that_of_the_multipliers_of_the_definition(seed, kind):
+    loop = remembering(random_loop(seed, gain=0.3), kind)
+    radius = np.abs(np.linalg.eigvals(matrix_by_definition(loop))).max()
+    found = periodic.verdict(loop)
+    assert found.verdict == ("stable" if radius < 1 else "unstable"), found
+    assert (found.method == "multipliers") == (kind != "its own")
+    assert periodic.spectral_radius(loop) == pytest.approx(radius, rel=1e-6)
+
+
+def test_multipliers_that_rounding_moves_across_the_circle_decide_nothing():
+    """Without compensator a memory of second order has each of its multipliers, 1, twice: one
+    Jordan block of two, of which rounding by 1e-16 makes 1 +- 1e-8."""
+    loop = replace(remembering(bar_loop(24, 0.3), "twice"), gain=0.0)
+    found = periodic.verdict(loop)
+    assert (found.verdict, found.method, found.outside) == ("undecided", "multipliers", None)
+    assert "moved by up to" in found.certificate
+    with pytest.raises(ValueError, match="undecided"):
+        periodic.steady_state(loop, np.ones(24))
+
+
+def test_only_a_memory_of_one_period_has_a_window():
+    loop = remembering(LOOP, "twice")
+    for judge in (periodic.count_outside, periodic.energy_gain, periodic.absolute_gain):
+        with pytest.raises(ValueError, match=r"only q z\^-N with N = 12 .* ask `verdict`"):
+            judge(loop)
 
 
 # ---- companions ----
@@ -491,33 +488,37 @@ def test_growth_is_the_norm_of_the_powers():
         assert found <= np.linalg.norm(power, 2) * (1 + 1e-12)
 
 
-@pytest.mark.parametrize("output", ["output", "repetitive"])
-def test_noise_gain_solves_the_lyapunov_equation(output):
+STABLE = {  # a loop of 18 samples; "within the period" remembers a third of it
+    "its own": lambda loop: loop,
+    "twice": lambda loop: replace(loop, memory=several(loop.memory, loop.memory), gain=0.8),
+    "odd harmonics of two periods": lambda loop: replace(loop, memory=odd_harmonic(36, Q20)),
+    "no whole period": lambda loop: replace(loop, memory=plain(17.7, Q20)),
+    "within the period": lambda loop: replace(loop, memory=plain(9, Q20)),
+}
+each_stable = pytest.mark.parametrize("kind", STABLE)
+
+
+@pytest.mark.parametrize("source", periodic.SOURCES)
+@pytest.mark.parametrize("output", periodic.OUTPUTS)
+def test_noise_gain_solves_the_lyapunov_equation(output, source):
     loop = bar_loop(18, 0.3, q=Q20)
-    _, reach, memory = sizes(loop)
-    n, matrix = loop.period, matrix_by_definition(loop)
-    entry, seen = [], []
-    for unit in np.eye(n):
-        x, u, w, y = by_definition(loop, unit)
-        after = [u.get(j, 0.0) for j in range(n - reach, n)]
-        after += [w.get(j, 0.0) for j in range(n - memory, n)]
-        entry.append(np.concatenate([x[n], after]))
-        seen.append(y if output == "output" else [u[k] for k in range(n)])
-    free = []
-    for unit in np.eye(len(matrix)):
-        _, u, _, y = from_state(loop, unit, np.zeros(n))
-        free.append(y if output == "output" else [u[k] for k in range(n)])
-    entry, free = np.array(entry).T, np.array(free).T
-    covariance = scipy.linalg.solve_discrete_lyapunov(matrix, entry @ entry.T)
-    variance = (np.trace(free @ covariance @ free.T) + np.sum(np.square(seen))) / n
-    assert periodic.noise_gain(loop, output) == pytest.approx(np.sqrt(variance), rel=1e-9)
+    expected = stationary_variance(loop, output, source)
+    assert periodic.noise_gain(loop, output, source) ** 2 == pytest.approx(expected, rel=1e-9)
+
+
+@each_stable
+def test_noise_gain_with_each_memory(kind):
+    loop = STABLE[kind](bar_loop(18, 0.3, q=Q20))
+    expected = stationary_variance(loop, "error", "disturbance")
+    found = periodic.noise_gain(loop, "error", "disturbance") ** 2
+    assert found == pytest.approx(expected, rel=1e-9)
 
 
 def test_noise_gain_is_what_a_long_run_shows():
     """4e5 samples of a standard deviation are good to about 0.5 %, times three."""
     loop = bar_loop(40, 0.5, q=Q20)
     noise = np.random.default_rng(5).standard_normal(40 * 10_000)
-    run = periodic.simulate(loop, np.zeros(noise.size), noise)
+    run = periodic.simulate(loop, np.zeros(noise.size), noise=noise)
     assert np.std(run.output[4000:]) == pytest.approx(periodic.noise_gain(loop), rel=0.015)
 
 
@@ -527,26 +528,49 @@ def test_steady_state_is_what_a_run_tends_to():
         reference = BAR.reference(3, 40)
         run = periodic.simulate(loop, np.tile(reference, 900))
         steady = periodic.steady_state(loop, reference)
-        for name in ("output", "repetitive", "command", "error"):
-            ours, theirs = getattr(steady, name), getattr(run, name)[-40:]
-            np.testing.assert_allclose(ours, theirs, atol=1e-9 * np.abs(theirs).max() + 1e-16)
+        for ours, theirs in zip(solved(steady), solved(run), strict=True):
+            np.testing.assert_allclose(ours, theirs[-40:], atol=1e-9 * np.abs(theirs).max())
         # without q the error vanishes; with it a known part of it stays
         assert (np.abs(steady.error).max() < 1e-12 * BAR.amplitude) == (len(q) == 1)
 
 
+@each_stable
+@pytest.mark.parametrize("periods", [1, 3])
+def test_steady_state_with_each_memory(kind, periods):
+    """A reference and a disturbance of one period, and of three that differ."""
+    loop = STABLE[kind](bar_loop(18, 0.3, q=Q20))
+    r, d = np.random.default_rng(2).standard_normal((2, 18 * periods))
+    run = periodic.simulate(loop, np.tile(r, 120), disturbance=np.tile(d, 120))
+    steady = periodic.steady_state(loop, r, disturbance=d)
+    for ours, theirs in zip(solved(steady), solved(run), strict=True):
+        np.testing.assert_allclose(ours, theirs[-r.size :], atol=1e-9 * np.abs(theirs).max())
+    np.testing.assert_allclose(steady.time, run.time[: r.size])
+    np.testing.assert_array_equal(steady.error, r - steady.output)
+
+
+def test_what_is_not_stable_has_no_steady_state():
+    with pytest.raises(
+        ValueError, match=r"the loop is unstable \(count: .*no steady state; choose"
+    ):
+        periodic.steady_state(bar_loop(32, 0.9), np.ones(32))
+    with pytest.raises(ValueError, match="the loop is undecided"):
+        periodic.steady_state(bar_loop(512, 0.5, "nominal"), np.ones(512))
+
+
 def test_an_unstable_run_stops_and_says_so():
     loop = bar_loop(32, 0.9)
-    run = periodic.simulate(loop, np.tile(BAR.reference(2, 32), 200), bound=1e6)
+    reference = np.tile(BAR.reference(2, 32), 600)
+    run = periodic.simulate(loop, reference)
     assert run.unbounded
-    assert 32 < run.output.size == run.error.size == run.reference.size < 32 * 200
-    assert np.all(np.isfinite(run.output))
-    assert np.abs([run.output, run.repetitive, run.command]).max() <= 1e6 * BAR.amplitude
-    longer = periodic.simulate(loop, np.tile(BAR.reference(2, 32), 200), bound=1e300)
-    assert np.all(np.isfinite(longer.output))
-    np.testing.assert_array_equal(longer.output[: run.output.size], run.output)
+    assert 32 < run.output.size == run.error.size == run.time.size < reference.size
+    assert np.abs(solved(run)).max() <= 1e9 * BAR.amplitude
+    limited = periodic.simulate(loop, reference, limits=Limits(command=Limit(1e12)))
+    assert limited.output.size == run.output.size
+    held = periodic.simulate(loop, reference, limits=Limits(Limit(2 * BAR.amplitude)))
+    assert not held.unbounded
 
 
-def test_frozen_symbol_is_the_response_of_a_lasting_sample():
+def test_factor_is_the_response_of_a_lasting_sample():
     loop = random_loop(2)
     z = zdomain.unit_circle(12)
     for k in range(loop.period):
@@ -557,12 +581,26 @@ def test_frozen_symbol_is_the_response_of_a_lasting_sample():
                 np.ones(12),
             ),
             Compensator(np.repeat(loop.compensator.taps[k : k + 1], 12, axis=0), loop.advance),
-            np.repeat(loop.q[k : k + 1], 12, axis=0),
+            Memory(loop.memory.taps, 12 - loop.memory.taps.size // 2, 12),
             loop.gain,
         )
         kernel = window_of_k(single, 1, 3000)[:, 0]
         expected = [np.sum(kernel * point ** -np.arange(-9.0, kernel.size - 9)) for point in z]
-        np.testing.assert_allclose(periodic.frozen_symbol(loop, z)[k], expected, atol=1e-9)
+        np.testing.assert_allclose(periodic.factor(loop, z)[k], expected, atol=1e-9)
+
+
+def test_mismatch_is_the_ratio_of_the_frozen_plants():
+    """A stiffer bar on the circle, from its own zero-order holds; without a model there is none."""
+    loop, z = bar_loop(12, 0.3), zdomain.unit_circle(8)
+    stiffer = replace(BAR, stiffness=1.2 * BAR.stiffness).plant
+    moved = replace(loop, plant=periodic.sample(stiffer, loop.plant.intervals), model=loop.plant)
+    assert np.all(periodic.mismatch(loop, z) == 0)
+    for k, interval in enumerate(loop.plant.intervals):
+        ours, theirs = (
+            zdomain.response(zdomain.zero_order_hold(periodic.balanced(each), interval), z)
+            for each in (stiffer, BAR.plant)
+        )
+        np.testing.assert_allclose(periodic.mismatch(moved, z)[k], ours / theirs - 1, atol=1e-9)
 
 
 # ---- bad input ----
@@ -579,20 +617,19 @@ REFUSED = [
     ("taps", lambda: Compensator([1.0, 2.0], 3), r"shape \(2,\); give a finite row per sample"),
     ("advance", lambda: Compensator([[1.0]], 0), "advance L = 0 must be .* not below 1"),
     ("rows", lambda: replace(LOOP, compensator=Compensator([[1.0]], 1)), "1 rows.*every 12"),
-    ("even q", lambda: replace(LOOP, q=[0.5, 0.5]), r"q of shape \(2,\): give an odd number"),
-    ("NaN in q", lambda: replace(LOOP, q=[np.nan]), "give an odd number"),
-    ("far look", lambda: replace(LOOP, q=np.ones(23) / 23), "period of 12 cannot hold; sample"),
+    ("model", lambda: replace(LOOP, model=bar_loop(9, 0).plant), "model repeats every 9 samples"),
+    ("far look", lambda: replace(bar_loop(12, 0), memory=5), "of 5 cannot hold; sample fas"),
     ("gain", lambda: replace(LOOP, gain=np.inf), "gain = inf"),
     ("horizon", lambda: periodic.least_squares(PLANT, 12, 3, 11), "horizon = 11.*look further"),
-    ("part of a period", lambda: periodic.simulate(LOOP, np.ones(13)), "13 samples are not whole"),
-    ("noise", lambda: periodic.simulate(LOOP, np.ones(12), np.ones(24)), "noise has 24 samples"),
-    ("bound", lambda: periodic.simulate(LOOP, np.ones(12), bound=0.0), "bound = 0.0"),
+    ("noise", lambda: periodic.simulate(LOOP, np.ones(12), noise=np.ones(24)), "noise has 24"),
     ("appendix", lambda: periodic.lifted(bar_loop(20, 0, q=Q20)), "appendix has no q"),
     ("radius", lambda: periodic.count_outside(LOOP, 0.0), "radius = 0.0"),
-    ("width", lambda: periodic.spectral_radius(LOOP, -1.0), "width = -1.0"),
-    ("reference", lambda: periodic.steady_state(LOOP, np.ones(11)), "11 samples, 12 are needed"),
-    ("unstable", lambda: periodic.noise_gain(bar_loop(32, 0.9)), "does not settle"),
-    ("output", lambda: periodic.noise_gain(LOOP, "error"), "'error': choose"),
+    ("width", lambda: periodic.radius_bounds(LOOP, -1.0), "width = -1.0"),
+    ("reference", lambda: periodic.steady_state(LOOP, np.ones(11)), "11 samples are not whole"),
+    ("unstable", lambda: periodic.noise_gain(bar_loop(32, 0.9)), "is unstable .count"),
+    ("output", lambda: periodic.noise_gain(LOOP, "outcome"), "'outcome': sources"),
+    ("source", lambda: periodic.noise_gain(LOOP, "error", "wind"), "'wind' to 'error'"),
+    ("long", lambda: periodic.noise_gain(bar_loop(2501, 0)), "2501: too long"),
     ("growth", lambda: periodic.transient_growth(LOOP, [0]), "periods = 0"),
     ("early", lambda: periodic.sample(BAR.plant, [1e-4], -1e-6), "delay = -1e-06 s must lie"),
     ("too late", lambda: periodic.sample(BAR.plant, [1e-4], 2e-4), "between 0 and one period"),
