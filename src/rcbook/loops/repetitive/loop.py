@@ -112,6 +112,11 @@ class Loop:
         """Samples that the controller remembers; None without one."""
         return None if self.repetitive is None else self.repetitive.period
 
+    @property
+    def look_ahead(self) -> float:
+        """Samples by which the controller looks ahead of a period ago; 0 without a memory."""
+        return getattr(self.repetitive, "look_ahead", 0)
+
     def with_gain(self, gain: float) -> Loop:
         """The same loop at another repetitive gain.  Raises ValueError when it has none."""
         return replace(self, repetitive=replace(self.require_controller(), gain=gain))
