@@ -177,3 +177,70 @@ def test_a_beat_that_ends_inside_the_band_has_not_settled():
     assert np.isfinite(signals.settling_time(y, 0.0, 0.5, 1.0))
     assert signals.settling_time(y, 0.0, 0.5, 1.0, hold=12) == np.inf
     assert signals.settling_time(np.append(y, np.zeros(12)), 0.0, 0.5, 1.0, hold=12) < np.inf
+
+
+# ---- periods that are no whole number of samples ----
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize(("period", "turns"), [(7.5, 2), (46.875, 8), (6.4, 5), (7 + 1 / 3, 3)])
+def test_harmonics_of_a_fractional_period_are_those_put_in(seed, period, turns):
+    rng = np.random.default_rng(seed)
+    orders = np.arange(1, 4)
+    put_in = rng.standard_normal(3) + 1j * rng.standard_normal(3)
+    k = np.arange(round(turns * period))
+    y = 0.7 + (put_in @ np.exp(2j * np.pi * np.outer(orders, k) / period)).real
+    for order, c in zip(orders, put_in, strict=True):
+        # rounding of a mean of at most 375 terms of order one
+        assert signals.harmonic(y, period, int(order)) == pytest.approx(c, abs=1e-12)
+    assert signals.harmonic(y, period, 0) == pytest.approx(0.7, abs=1e-12)
+    cut = y[:-1]
+    with pytest.raises(ValueError, match="not whole periods"):
+        signals.harmonic(cut, period)
+
+
+@pytest.mark.parametrize("lag", [-150.0, -30.0, 0.0, 90.0])
+def test_phase_at_a_fractional_period(lag):
+    k = np.arange(375)
+    x = np.cos(2 * np.pi * k / 46.875 + 0.4)
+    y = 3 * np.cos(2 * np.pi * k / 46.875 + 0.4 + np.radians(lag)) - 0.2
+    # rounding, in degrees
+    assert signals.phase_between(y, x, 46.875) == pytest.approx(lag, abs=1e-10)
+
+
+@pytest.mark.parametrize("size", [2, 5, 6, 24, 25])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_period_of_its_own_length_repeats_the_shape(size, seed):
+    shape = np.random.default_rng(seed).standard_normal(size)
+    assert signals.periodic(shape, 60).tolist() == np.resize(shape, 60).tolist()
+    # rounding of sums of 24 terms of order one
+    found = signals.periodic(shape, 60, float(size))
+    np.testing.assert_allclose(found, np.resize(shape, 60), atol=1e-12)
+
+
+@pytest.mark.parametrize("period", [6.4, 12.0, 24.3, 46.875, 400.5])
+def test_a_shape_of_few_harmonics_is_that_signal_at_any_period(period):
+    def wave(turn):
+        return 0.3 + np.sin(2 * np.pi * turn + 0.2) - 0.5 * np.cos(6 * np.pi * turn)
+
+    found = signals.periodic(wave(np.arange(24) / 24), 200, period)
+    # rounding: three harmonics, all below half the sampling frequency of 6.4 samples a period
+    np.testing.assert_allclose(found, wave(np.arange(200) / period), atol=1e-12)
+    late = wave(np.arange(1, 201) / period)
+    assert np.abs(found - late).max() > 1e-3
+
+
+def test_harmonics_beyond_half_the_sampling_frequency_are_left_out():
+    """cos 3 x in a shape of 24 samples, at 5 samples a period: it would look like cos 2 x."""
+    turn = np.arange(24) / 24
+    found = signals.periodic(np.cos(2 * np.pi * turn) + np.cos(6 * np.pi * turn), 50, 5.0)
+    np.testing.assert_allclose(found, np.cos(2 * np.pi * np.arange(50) / 5), atol=1e-12)
+
+
+def test_a_period_that_is_not_positive_is_refused():
+    for verb in (
+        lambda p: signals.periodic([1.0, 2.0], 4, p),
+        lambda p: signals.harmonic([1.0], p),
+    ):
+        with pytest.raises(ValueError, match=r"period = -2\.5 must be a positive"):
+            verb(-2.5)

@@ -51,9 +51,22 @@ def triangle(
     return signal(bias + real_number(amplitude, "amplitude") * wave, "triangle")
 
 
-def periodic(shape: ArrayLike, n: int) -> np.ndarray:
-    """n samples of the periodic signal whose one period is `shape`."""
-    return np.resize(signal(shape, "shape"), whole_number(n, "n"))
+def periodic(shape: ArrayLike, n: int, period: float | None = None) -> np.ndarray:
+    """n samples of the periodic signal whose one period is `shape`, of `period` samples if given.
+
+    A period that is not the number of samples of the shape is reached by its trigonometric
+    interpolation, without the harmonics beyond half the sampling frequency.
+    Raises ValueError for a period that is not positive.
+    """
+    shape, n = signal(shape, "shape"), whole_number(n, "n")
+    if period is None:
+        return np.resize(shape, n)
+    period = real_number(period, "period", positive=True)
+    size = shape.size
+    order = np.arange(min(size, int(np.floor(period))) // 2 + 1)
+    twice = np.where((order == 0) | (2 * order == size), 1, 2)  # the mirror image below zero
+    turned = np.exp(2j * np.pi * np.outer(np.arange(n), order) / period)
+    return (turned @ (twice * np.fft.rfft(shape)[order])).real / size
 
 
 def random_period(period: int, amplitude: float, rng: np.random.Generator) -> np.ndarray:
@@ -102,25 +115,26 @@ def settling_time(y: ArrayLike, target: ArrayLike, band: float, dt: float, hold:
     return np.inf if unsettled else float((outside[-1] + 1) * dt)
 
 
-def harmonic(y: ArrayLike, period: int, order: int = 1) -> complex:
+def harmonic(y: ArrayLike, period: float, order: int = 1) -> complex:
     """Complex amplitude c of the harmonic |c| cos(2 pi order k/period + arg c) of y.
 
-    y must hold whole periods; raises ValueError when it does not.
+    y must hold whole periods, each of them whole or not; raises ValueError when it does not.
     """
-    y, period = signal(y), whole_number(period, "period")
-    if y.size % period:
-        raise ValueError(f"{y.size} samples are not whole periods of {period}; cut the record")
+    y, period = signal(y), real_number(period, "period", positive=True)
+    turns = round(y.size / period)
+    if turns < 1 or abs(turns * period - y.size) > 1e-9 * y.size:
+        raise ValueError(f"{y.size} samples are not whole periods of {period:g}; cut the record")
     k = np.arange(y.size)
-    scale = 1 if order % period in (0, period / 2) else 2
+    scale = 1 if 2 * order * turns % y.size == 0 else 2
     return scale * complex(np.mean(y * np.exp(-2j * np.pi * order * k / period)))
 
 
-def phase_between(y: ArrayLike, x: ArrayLike, period: int) -> float:
+def phase_between(y: ArrayLike, x: ArrayLike, period: float) -> float:
     """Phase of y relative to x at the fundamental, degrees from -180 to 180; a lag is negative.
 
     Raises ValueError when either has no fundamental to speak of (below 1e-9 of its size).
     """
     ours, theirs = harmonic(y, period), harmonic(x, period)
     if min(abs(ours) / (rms(y) or 1), abs(theirs) / (rms(x) or 1)) < 1e-9:
-        raise ValueError(f"no fundamental of period {period} in one of the signals: no phase")
+        raise ValueError(f"no fundamental of period {period:g} in one of the signals: no phase")
     return float(np.degrees(np.angle(ours / theirs)))
