@@ -29,7 +29,7 @@ def controller(mill, gain=1.0, q=None, output="force"):
         face_mill.control_model(mill, output=output), cancel_unstable=True
     )
     q = zdomain.binomial_q(2) if q is None else q
-    return RepetitiveController(inverse, mill.samples_per_turn, gain, q)
+    return RepetitiveController(inverse, repetitive.plain(mill.samples_per_turn, q), gain)
 
 
 def cutting(mill, output="force", **reading):
@@ -305,8 +305,8 @@ def test_the_bound_of_the_learning_gain_is_the_theorem():
     loop = zdomain.response(law.compensator, z) * zdomain.response(plant, z)
     assert 2 / np.max(loop.real) == pytest.approx(2, abs=1e-9)
     for gain, outside in ((2.027, 0), (2.029, 2)):
-        loop = repetitive.Loop(repetitive.Process(plant), replace(law, gain=gain))
-        assert np.sum(np.abs(repetitive.stability(loop).roots) > 1 + 1e-9) == outside
+        loop = repetitive.Loop(plant, replace(law, gain=gain))
+        assert np.sum(np.abs(repetitive.roots(loop)) > 1 + 1e-9) == outside
 
 
 # ---- the printed controller at work ----

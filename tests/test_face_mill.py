@@ -36,7 +36,8 @@ def random_runout(teeth, size, seed):
 def repetitive_controller(mill, gain=1.0, passes=2, torque_feedback=True):
     model = face_mill.control_model(mill, torque_feedback)
     inverse = zdomain.zero_phase_inverse(model, cancel_unstable=True)
-    return RepetitiveController(inverse, mill.samples_per_turn, gain, zdomain.binomial_q(passes))
+    memory = repetitive.plain(mill.samples_per_turn, zdomain.binomial_q(passes))
+    return RepetitiveController(inverse, memory, gain)
 
 
 # ---- against the equations, written down a second time ----

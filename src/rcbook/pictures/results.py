@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 from pandas.io.formats.style import Styler
 
-from rcbook.loops.repetitive import Run
+from rcbook.loops.run import Run
 from rcbook.zdomain import Plant
 
 LABELS = {
@@ -19,8 +19,8 @@ LABELS = {
     "output": "force",
     "command": "feed command",
     "repetitive": "repetitive command",
-    "error": "error seen by the repetitive controller",
-    "inner_error": "error seen by the PI controller",
+    "error": "error",
+    "measured_error": "error seen by the repetitive controller",
 }
 AXES = {
     "time": "time (s)",
