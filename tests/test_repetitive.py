@@ -890,3 +890,57 @@ def test_controller_gains_are_those_of_a_scan(delay, alpha):
         scaled = replace(pi, b=factor * pi.b)
         inside = any(low < factor < high for low, high in intervals)
         assert inside == Process(plant, scaled).command_path.is_stable, factor
+
+
+# ---- searches ----
+
+
+def test_meeting_gains_are_where_two_poles_of_the_locus_are_one():
+    found = repetitive.meeting_gains(MILLING)
+    assert found.size >= 3
+    for factor in found:
+        tuned = Process(MILL, replace(PI, b=factor * PI.b))
+        poles = np.sort_complex(np.roots(tuned.command_path.a))
+        # a double root splits by the root of rounding
+        assert np.abs(np.diff(poles)).min() < 1e-6
+        off = Process(MILL, replace(PI, b=1.01 * factor * PI.b))
+        assert np.abs(np.diff(np.sort_complex(np.roots(off.command_path.a)))).min() > 1e-4
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_gain_bound_is_where_the_first_value_leaves_the_disc(seed):
+    rng = np.random.default_rng(seed)
+    g = rng.uniform(0.2, 2, 30) * np.exp(1j * rng.uniform(-1.4, 1.4, 30))
+    bound = repetitive.gain_bound(g)
+    assert np.abs(1 - bound * g).max() == pytest.approx(1, abs=1e-12)
+    assert np.abs(1 - 0.999 * bound * g).max() < 1 < np.abs(1 - 1.001 * bound * g).max()
+    assert repetitive.gain_bound([1.0, -0.1]) == 0.0
+    assert repetitive.gain_bound([1.0, 1.0]) == 2.0
+
+
+def test_acceptable_gains_of_a_staircase_have_a_closed_form():
+    """20 (1 - (1 - k)^m): within 2 after two turns for |1 - k| <= sqrt(0.1), over by k - 1."""
+    loop = design(MILLING, 6, 0.8)
+
+    def fault(run):
+        return max(np.abs(run.output[12:] - 20).max() - 2, run.output.max() - 24)
+
+    grid, step = np.arange(0.29, 1.8, 0.02), np.full(60, 20.0)
+    low, high = repetitive.acceptable_gains(loop, grid, fault, step)
+    # refined to 1e-12; rounding of a run of 60 samples
+    assert low == pytest.approx(1 - np.sqrt(0.1), abs=1e-9)
+    assert high == pytest.approx(1.2, abs=1e-9)
+    with pytest.raises(ValueError, match="0 ends of a range among 2 gains"):
+        repetitive.acceptable_gains(loop, [0.9, 1.0], fault, step)
+
+
+def test_swings_are_half_ranges_of_the_last_windows():
+    r = np.full(60, 20.0)
+    run = repetitive.respond(design(MILLING, 6, 0.8), r, disturbance=np.sin(np.arange(60)))
+    found = repetitive.swings(run, 12, 3)
+    truth = [(y.max() - y.min()) / 2 for y in (run.output[24:36], run.output[36:48])]
+    assert found[:2].tolist() == truth and found.size == 3
+    with pytest.raises(ValueError, match="60 samples hold no 6 windows of 12"):
+        repetitive.swings(run, 12, 6)
+    away = repetitive.simulate(design(MILLING, 6, 2.6), np.full(900, 20.0))
+    assert away.unbounded and repetitive.swings(away, 12, 2).tolist() == [np.inf, np.inf]

@@ -1,7 +1,7 @@
 """The repetitive loop: a controller that remembers one period, round a process.
 
-`loop` puts it together, `stability` judges it, `response` runs it; what all loops share, memories
-and limits among it, is handed on.
+`loop` puts it together, `stability` judges it, `response` runs it, `search` looks for gains that
+will do; what all loops share, memories and limits among it, is handed on.
 """
 
 from rcbook.loops.memory import (
@@ -31,6 +31,12 @@ from rcbook.loops.repetitive.response import (
     simulate,
     steady_state,
     transfer,
+)
+from rcbook.loops.repetitive.search import (
+    acceptable_gains,
+    gain_bound,
+    meeting_gains,
+    swings,
 )
 from rcbook.loops.repetitive.stability import (
     controller_gains,

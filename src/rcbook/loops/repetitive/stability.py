@@ -147,12 +147,20 @@ def controller_gains(process: Process, highest: float = 100.0) -> Gains:
 
     Raises ValueError when the process has no controller.
     """
+    return _stable_factors(*controller_polynomials(process), highest)
+
+
+def controller_polynomials(process: Process) -> tuple[np.ndarray, np.ndarray]:
+    """d and n, in z^-1 and equally long, of the closed loop d + k n at k times the controller.
+
+    Raises ValueError when the process has no controller.
+    """
     if process.controller is None:
         raise ValueError("the process has no controller whose gain could be changed; give it one")
     n, c, _ = process.parts
-    return _stable_factors(
-        multiply(c, process.plant.a), multiply(process.plant.numerator, n), highest
-    )
+    d, n = multiply(c, process.plant.a), multiply(process.plant.numerator, n)
+    length = max(d.size, n.size)
+    return np.pad(d, (0, length - d.size)), np.pad(n, (0, length - n.size))
 
 
 def _stable_factors(d: np.ndarray, n: np.ndarray, highest: float) -> Gains:
