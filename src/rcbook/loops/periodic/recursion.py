@@ -37,6 +37,7 @@ class Recursion:
     past: scipy.sparse.csr_array  # its columns of the state
     solver: SuperLU
     last: np.ndarray  # where in the timeline the next state stands
+    advanced: int  # L, samples
     reach: int
     memory: int
 
@@ -84,11 +85,11 @@ class Recursion:
                 kept[at] = sent[at] if limit.remember_clipped else value
         return kept, sent, clipped
 
-    def units(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def units(self, first: int = 0) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """All unit states, then all unit signals of one period, a few columns at once."""
-        for i in range(0, self.size + self.plant.period, _AT_ONCE):
-            each = np.eye(self.size + self.plant.period, _AT_ONCE, -i)
-            each = each[:, : self.size + self.plant.period - i]
+        rows = self.size + self.plant.period
+        for i in range(first, rows, _AT_ONCE):
+            each = np.eye(rows, min(_AT_ONCE, rows - i), -i)
             yield each[: self.size], each[self.size :]
 
     def advance(self, state: np.ndarray) -> np.ndarray:
@@ -150,5 +151,5 @@ def recursion(plant: PeriodicPlant, taps: np.ndarray, advance: int, memory: Memo
     solver = splu(matrix[:, head:].tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0)
     last = [x(np.array(n)), u(np.arange(n - reach, n)), w(np.arange(n - remembered, n))]
     return Recursion(
-        plant, matrix, matrix[:, :head], solver, np.concatenate(last), reach, remembered
+        plant, matrix, matrix[:, :head], solver, np.concatenate(last), advance, reach, remembered
     )

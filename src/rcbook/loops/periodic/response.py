@@ -1,4 +1,4 @@
-"""Responses of a periodic loop: sample by sample, in steady state, and to noise."""
+"""Responses of a periodic loop: sample by sample, and in steady state."""
 
 from __future__ import annotations
 
@@ -13,12 +13,10 @@ from rcbook.loops.periodic.loop import PeriodicLoop
 from rcbook.loops.periodic.recursion import Recursion
 from rcbook.loops.periodic.verdict import verdict
 from rcbook.loops.run import BOUND, Limits, Run
-from rcbook.loops.verdict import require_ends, require_stable
+from rcbook.loops.verdict import require_stable
 from rcbook.signals import signal
 
 _FREE = Limits()
-_LONGEST = 2500  # samples of a period; the matrices of a longer one do not fit a small machine
-_SETTLED = 1e-11  # of the variance, what the last doubling may add
 _MEND = "choose another design or gain, or shorten q"
 
 
@@ -122,51 +120,3 @@ def _closed_circle(once: Recursion, periods: int) -> scipy.sparse.csc_array:
     before = scipy.sparse.coo_array(np.roll(np.eye(periods), 1, axis=0))
     each = scipy.sparse.eye_array(periods)
     return (scipy.sparse.kron(each, own) - scipy.sparse.kron(before, ended)).tocsc()
-
-
-def noise_gain(loop: PeriodicLoop, output: str = "output", source: str = "noise") -> float:
-    """Stationary standard deviation of an output per unit of white noise, rms over the period.
-
-    The covariance of the state is summed by doubling, with dense matrices, until what is added
-    is below 1e-11 of it: up to some two thousand samples per period.
-    Raises ValueError for a loop that is not stable, for a longer period, and for unknown names.
-    """
-    require_ends(output, source)
-    if loop.period > _LONGEST:
-        raise ValueError(f"period {loop.period}: too long for dense matrices; simulate with noise")
-    found = verdict(loop)
-    if found.verdict == "unstable":
-        require_stable(found, _MEND)
-    (power, entry), (free, driven) = _answers(loop, output, source)
-    covariance = entry @ entry.T
-    with np.errstate(over="ignore", invalid="ignore"):
-        for _ in range(60):
-            added = power @ covariance @ power.T
-            covariance = covariance + added
-            if not np.all(np.isfinite(covariance)):
-                break
-            if np.trace(added) <= _SETTLED * np.trace(covariance):
-                variance = np.sum((free @ covariance) * free) + np.sum(driven**2)
-                return float(np.sqrt(variance / loop.period))
-            power = power @ power
-    raise ValueError(f"the response to noise does not settle: the loop is {found}; {_MEND}")
-
-
-def _answers(
-    loop: PeriodicLoop, output: str, source: str
-) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """One period from every unit state, and from a unit of the source at every sample.
-
-    Returns the states at its end, from states and from the source, and so the output on the way.
-    """
-    once, ends, seen = loop.recursion, [], []
-    for state, unit in once.units():
-        error = unit * ((source == "reference") - (source == "noise"))
-        right = once.right(error, unit * (source == "disturbance"))
-        timeline = once.run(state, right)
-        y, v, u = once.signals(timeline)
-        direct = {"error": unit * (source == "reference"), "measured_error": error}
-        ends.append(timeline[once.last])
-        seen.append({"output": y, "command": v, "repetitive": u}.get(output, -y))
-        seen[-1] = seen[-1] + direct.get(output, 0.0)
-    return tuple(np.split(np.hstack(found), [once.size], axis=1) for found in (ends, seen))

@@ -16,6 +16,8 @@ The first two need a memory q z^-N and O(N) work; the last takes any memory and 
 
 from __future__ import annotations
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 import scipy.linalg
 
@@ -29,13 +31,23 @@ from rcbook.loops.verdict import Verdict, judged
 _ROUNDING = 1e-14  # of the norm of the matrix, a change that it has suffered for certain
 
 
+_KNOWN: WeakKeyDictionary[PeriodicLoop, Verdict] = WeakKeyDictionary()
+
+
 def verdict(loop: PeriodicLoop) -> Verdict:
     """Stable, unstable or undecided: in O(N) work for a memory q z^-N, else from all multipliers.
 
     "stable" by `energy_gain` below one needs no multipliers; else they are counted on the unit
     circle.  "undecided" means that rounding in the data moves multipliers across it: the powers
     of the one-period map then grow far before they decay, if they do; see `transient_growth`.
+    A loop that is asked again is not judged again.
     """
+    if loop not in _KNOWN:
+        _KNOWN[loop] = _judge(loop)
+    return _KNOWN[loop]
+
+
+def _judge(loop: PeriodicLoop) -> Verdict:
     if not loop.has_window:
         return _by_multipliers(loop)
     if _plant_decays(loop.plant) and dissipates(loop.window, np.array([1.0 - 1e-6]))[0]:
