@@ -87,7 +87,7 @@ def in_order(signal):
 
 
 def solved(run):
-    return run.output, run.repetitive, run.command
+    return run.output, run.command
 
 
 # ---- the definition, sample by sample ----
@@ -115,12 +115,13 @@ def test_one_period_map_is_the_recursion(seed, kind, n):
 def test_simulation_is_the_recursion(seed, kind):
     loop = remembering(random_loop(seed, gain=0.1), kind)
     r, d, noise = np.random.default_rng(seed).standard_normal((3, 5 * loop.period + 3))
-    _, u, _, v, y = by_definition(loop, r - noise, disturbance=d)
+    *_, v, y = by_definition(loop, r - noise, disturbance=d)
     run = periodic.simulate(loop, r, disturbance=d, noise=noise)
     assert not run.unbounded
     assert run.command_clipped == run.repetitive_clipped == 0
-    for found, expected in zip(solved(run), (y, in_order(u), in_order(v)), strict=True):
+    for found, expected in zip(solved(run), (y, in_order(v)), strict=True):
         np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
+    np.testing.assert_array_equal(run.repetitive, run.command)
     np.testing.assert_array_equal(run.error, r - run.output)
     np.testing.assert_array_equal(run.measured_error, r - run.output - noise)
     np.testing.assert_array_equal(run.disturbance, d)
@@ -137,14 +138,18 @@ def test_limits_clip_sample_by_sample(kind, remember):
     loop = random_loop(3, gain=0.1)
     r, d = np.random.default_rng(1).standard_normal((2, 6 * loop.period))
     free = periodic.simulate(loop, r, disturbance=d)
-    limit = Limit(0.5 * np.abs(getattr(free, kind)).max(), remember)
+    limited = {"repetitive": 1, "command": 3}[kind]  # u or v
+    largest = np.abs(in_order(by_definition(loop, r, disturbance=d)[limited])).max()
+    limit = Limit(0.5 * largest, remember)
     _, u, _, v, y = by_definition(loop, r, disturbance=d, **{kind: limit})
     run = periodic.simulate(loop, r, disturbance=d, limits=Limits(**{kind: limit}))
-    for found, expected in zip(solved(run), (y, in_order(u), in_order(v)), strict=True):
+    for found, expected in zip(solved(run), (y, in_order(v)), strict=True):
         np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
-    assert np.abs(getattr(run, kind)).max() == limit.value
+    met = np.sum(np.abs(in_order((u, v)[kind == "command"])) == limit.value)
     clipped = {"command": run.command_clipped, "repetitive": run.repetitive_clipped}
-    assert clipped.pop(kind) == np.sum(np.abs(getattr(run, kind)) == limit.value) > 3
+    assert clipped.pop(kind) == met > 3
+    asked = np.clip(run.repetitive, -limit.value, limit.value) if kind == "command" else run.command
+    np.testing.assert_array_equal(run.repetitive if kind == "repetitive" else run.command, asked)
     assert list(clipped.values()) == [0]
     assert np.abs(run.output - free.output).max() > 1e-3
 

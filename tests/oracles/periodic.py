@@ -137,7 +137,7 @@ def stationary_variance(loop, output, source):
         x, u, w, v, y = by_definition(loop, sign * unit, state[:order], u, w, disturbance)
         seen = {
             "output": y,
-            "repetitive": np.array([u[k] for k in range(n)]),
+            "repetitive": np.array([v[k] for k in range(n)]),
             "command": np.array([v[k] for k in range(n)]),
             "error": unit * (source == "reference") - y,
             "measured_error": sign * unit - y,

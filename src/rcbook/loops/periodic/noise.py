@@ -43,9 +43,10 @@ def _followed(loop: PeriodicLoop, output: str, source: str) -> float | None:
     None when it has not faded after so many periods, or grows: then what is dropped grows too.
     """
     once = loop.recursion
-    inside = blocks(once, command=output == "command")
+    sent = output in ("command", "repetitive")  # one signal: the compensator ends the controller
+    inside = blocks(once, command=sent)
     timeline = np.zeros((inside.kind.size, loop.period))
-    rows = {"command": inside.v, "repetitive": inside.u}.get(output, inside.w)
+    rows = inside.v if sent else inside.w
     state, seen = _answers(loop, output, source, once.size)
     energies = [float(np.sum(seen**2))]
     while len(energies) < _PASSES:
@@ -92,9 +93,9 @@ def _answers(
     for state, unit in once.units(first):
         error = unit * ((source == "reference") - (source == "noise"))
         timeline = once.run(state, once.right(error, unit * (source == "disturbance")))
-        y, v, u = once.signals(timeline)
+        y, v = once.signals(timeline)
         direct = {"error": unit * (source == "reference"), "measured_error": error}
-        answer = {"output": y, "command": v, "repetitive": u}.get(output, -y)
+        answer = {"output": y, "command": v, "repetitive": v}.get(output, -y)
         ends.append(timeline[once.last])
         seen.append(answer + direct.get(output, 0.0))
     return np.hstack(ends), np.hstack(seen)

@@ -68,7 +68,8 @@ class Recursion:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Two timelines, row by row, and how often a period u and v met their limits.
 
-        `kept` has the u that the memory goes on from, `sent` the one that is filtered.
+        `kept` has the u that the memory goes on from and the v that was asked for, `sent` the u
+        that is filtered and the v that the plant gets.
         """
         kept, sent = (np.concatenate([s, np.zeros(right.size)]) for s in (kept, sent))
         most = {1: limits.repetitive, 2: limits.command}
@@ -82,7 +83,7 @@ class Recursion:
             if limit := most.get(kind):
                 sent[at] = np.clip(value, -limit.value, limit.value)
                 clipped[kind - 1, k] = abs(value) > limit.value
-                kept[at] = sent[at] if limit.remember_clipped else value
+                kept[at] = sent[at] if kind == 1 and limit.remember_clipped else value
         return kept, sent, clipped
 
     def units(self, first: int = 0) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -106,11 +107,11 @@ class Recursion:
         back = self.solver.solve(spread[self.size :], trans="T")
         return spread[: self.size] - self.past.T @ back
 
-    def signals(self, timeline: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """y, v and u of one period, a row a sample."""
+    def signals(self, timeline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """y and v of one period, a row a sample."""
         now = timeline[self.size :].reshape(self.plant.period, self.step, *timeline.shape[1:])
         x = np.concatenate([timeline[None, : self.plant.order], now[:-1, 3:]])
-        return np.einsum("i,ki...->k...", self.plant.c, x), now[:, 2], now[:, 1]
+        return np.einsum("i,ki...->k...", self.plant.c, x), now[:, 2]
 
 
 def recursion(plant: PeriodicPlant, taps: np.ndarray, advance: int, memory: Memory) -> Recursion:

@@ -30,8 +30,9 @@ def simulate(
 ) -> Run:
     """Run the loop from rest, limits included; without limits a period is one sparse solve.
 
-    The disturbance acts on the plant input, the noise on the measured output; the limits on the
-    command v and on u, which the compensator filters.
+    The disturbance acts on the plant input, the noise on the measured output.  What the controller
+    sends is v, so `repetitive` is the command before its limit; the other limit is on u, what the
+    memory hands to the compensator.
     Raises ValueError when the signals differ in length or hold NaN.
     """
     inputs = _inputs(reference, disturbance, noise)
@@ -42,11 +43,11 @@ def simulate(
         found.append(signals)
         if not np.abs(signals[:3]).max() <= limit:
             break
-    y, v, u, clipped_v, clipped_u = np.concatenate(found, axis=1)[:, : inputs.shape[1]]
-    inside = np.abs([y, v, u]).max(axis=0) <= limit
+    y, v, asked, clipped_v, clipped_u = np.concatenate(found, axis=1)[:, : inputs.shape[1]]
+    inside = np.abs([y, v, asked]).max(axis=0) <= limit
     end = inside.size if inside.all() else int(np.argmin(inside))
     acted = (int(clipped[:end].sum()) for clipped in (clipped_v, clipped_u))
-    signals = (s[:end] for s in (*inputs, y, v, u))
+    signals = (s[:end] for s in (*inputs, y, v, asked))
     return Run(_time(loop, end), *signals, end < inside.size, *acted)
 
 
@@ -77,7 +78,8 @@ def _linear(loop: PeriodicLoop, inputs: np.ndarray, _: Limits) -> Iterator[np.nd
     for right in _added(loop, inputs):
         timeline = once.run(state, right)
         state = timeline[once.last]
-        yield np.array([*once.signals(timeline), *untouched])
+        y, v = once.signals(timeline)
+        yield np.array([y, v, v, *untouched])
 
 
 def _limited(loop: PeriodicLoop, inputs: np.ndarray, limits: Limits) -> Iterator[np.ndarray]:
@@ -85,7 +87,8 @@ def _limited(loop: PeriodicLoop, inputs: np.ndarray, limits: Limits) -> Iterator
     kept = sent = np.zeros(once.size)
     for right in _added(loop, inputs):
         kept, sent, clipped = once.limited(kept, sent, right, limits)
-        yield np.array([*once.signals(sent), *clipped[::-1]])
+        asked = once.signals(kept)[1]
+        yield np.array([*once.signals(sent), asked, *clipped[::-1]])
         kept, sent = kept[once.last], sent[once.last]
 
 
@@ -107,8 +110,8 @@ def steady_state(
     matrix = _closed_circle(once, len(added))
     right = np.concatenate([np.concatenate([np.zeros(once.size), each]) for each in added])
     timelines = splu(matrix).solve(right).reshape(len(added), -1)
-    y, v, u = np.concatenate([once.signals(timeline) for timeline in timelines], axis=1)
-    return Run(_time(loop, y.size), *inputs, y, v, u)
+    y, v = np.concatenate([once.signals(timeline) for timeline in timelines], axis=1)
+    return Run(_time(loop, y.size), *inputs, y, v, v)
 
 
 def _closed_circle(once: Recursion, periods: int) -> scipy.sparse.csc_array:
