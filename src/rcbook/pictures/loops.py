@@ -177,3 +177,22 @@ def draw_periodic_loop(ax: Axes) -> Axes:
         *(Wire("spindle", end, dashed=True) for end in ("hold", "sampler")),
     ]
     return blocks.draw_block_diagram(ax, items, wires)
+
+
+def draw_delay_line(ax: Axes, cells: int = 6) -> Axes:
+    """Draw a memory of one period: `cells` numbers in a row that wait, are used and come again."""
+    row_of = [Block(f"cell {k}", f"{k + 1}", (1.5 * k, 0.0), FOCUS) for k in range(cells)]
+    end = row_of[-1].xy[0]
+    items = [
+        *row_of,
+        Sum("corrected", (-1.9, 0.0), {"n": "+", "s": "+"}),
+        Node("used", (end + 1.3, 0.0)),
+    ]
+    wires = [
+        *path("corrected", "", "cell 0"),
+        *(Wire(f"cell {k}", f"cell {k + 1}") for k in range(cells - 1)),
+        *path(f"cell {cells - 1}", "", "used", "to the machine", (end + 4.2, 0.0)),
+        Wire("used", "corrected", "the same number, a turn later", via=-1.4),
+        Wire((-1.9, 1.5), "corrected", "a part of the error", color=DISTURBED),
+    ]
+    return blocks.draw_block_diagram(ax, items, wires)
