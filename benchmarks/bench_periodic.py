@@ -5,9 +5,12 @@ Run it with `python benchmarks/bench_periodic.py`; it asserts nothing about time
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from timing import seconds
 
+from rcbook import zdomain
 from rcbook.loops import periodic
 from rcbook.machines.boring_bar import HANSON_TSAO2000, sinusoidal_intervals
 
@@ -18,12 +21,14 @@ ROUTES = {
 }
 
 
-def scheduled(n: int, gamma: float = 0.3) -> periodic.PeriodicLoop:
+def scheduled(n: int, gamma: float = 0.3, q: tuple[float, ...] = (1.0,)) -> periodic.PeriodicLoop:
     """The gain-scheduled design on the boring bar."""
     bar = HANSON_TSAO2000
     intervals = sinusoidal_intervals(bar.sampling_interval, gamma, n)
     plant = periodic.sample(bar.plant, intervals)
-    return periodic.PeriodicLoop(plant, periodic.zero_phase(bar.plant, intervals))
+    return periodic.PeriodicLoop(
+        plant, periodic.zero_phase(bar.plant, intervals), periodic.plain(n, q)
+    )
 
 
 def routes() -> None:
@@ -46,11 +51,23 @@ def verdicts() -> None:
         once = periodic.one_period_map(loop)
         state = np.ones(once.shape[0])
         each = seconds(lambda once=once, state=state: once @ state)
-        energy = seconds(lambda loop=loop: periodic.verdict(loop))
+        energy = seconds(lambda loop=loop: periodic.verdict(replace(loop)))  # a loop not yet judged
         counted = seconds(lambda loop=loop: periodic.count_outside(loop))
         print(f"{n:6d}: by energy {energy / each:8.0f}, by counting {counted / each:8.0f}")
+
+
+def noise() -> None:
+    """Time of a noise gain, relative to one product of matrices as large as the state."""
+    print("\none noise gain, in products of dense matrices of the states")
+    for n in (150, 600, 1200):
+        loop = scheduled(n, q=zdomain.symmetric_fir([0.8, 0.1]))
+        matrix = periodic.dense(loop)
+        product = seconds(lambda matrix=matrix: matrix @ matrix)
+        gain = seconds(lambda loop=loop: periodic.noise_gain(loop))
+        print(f"{n:6d}: {gain / product:8.1f}")
 
 
 if __name__ == "__main__":
     routes()
     verdicts()
+    noise()

@@ -86,12 +86,11 @@ class Recursion:
                 kept[at] = sent[at] if kind == 1 and limit.remember_clipped else value
         return kept, sent, clipped
 
-    def units(self, first: int = 0) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        """All unit states, then all unit signals of one period, a few columns at once."""
-        rows = self.size + self.plant.period
-        for i in range(first, rows, _AT_ONCE):
-            each = np.eye(rows, min(_AT_ONCE, rows - i), -i)
-            yield each[: self.size], each[self.size :]
+    def units(self) -> Iterator[np.ndarray]:
+        """All unit signals of one period, a few columns at once."""
+        n = self.plant.period
+        for i in range(0, n, _AT_ONCE):
+            yield np.eye(n, min(_AT_ONCE, n - i), -i)
 
     def advance(self, state: np.ndarray) -> np.ndarray:
         """The next state, of one state or of each column."""

@@ -50,7 +50,7 @@ def verdict(loop: PeriodicLoop) -> Verdict:
 def _judge(loop: PeriodicLoop) -> Verdict:
     if not loop.has_window:
         return _by_multipliers(loop)
-    if _plant_decays(loop.plant) and dissipates(loop.window, np.array([1.0 - 1e-6]))[0]:
+    if decays(loop.plant) and dissipates(loop.window, np.array([1.0 - 1e-6]))[0]:
         grounds = "a storage function shows that every period shrinks the energy of u"
         return Verdict("stable", "energy", grounds, 0)
     found = count_outside(loop)
@@ -79,7 +79,7 @@ def _by_multipliers(loop: PeriodicLoop) -> Verdict:
     return Verdict("undecided", "multipliers", grounds)
 
 
-def _plant_decays(plant: PeriodicPlant) -> bool:
+def decays(plant: PeriodicPlant) -> bool:
     """Whether the plant by itself forgets its state, seen at the output or not."""
     product = np.eye(plant.order)
     with np.errstate(over="ignore", invalid="ignore"):
