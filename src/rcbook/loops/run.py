@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-BOUND = 1e9  # times the largest input; a signal beyond it belongs to a loop that ran away
+BOUND = 1e30  # times the largest input, whatever the units: a loop that ran away
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Limits:
 class Run:
     """Signals of one simulation, each of n samples, in the units of the plant.
 
-    It ends early, and is `unbounded`, where a signal exceeds 1e9 times the largest input.
+    It ends early, and is `unbounded`, where a signal exceeds 1e30 times the largest input.
     """
 
     time: np.ndarray  # s, sampling instants

@@ -18,7 +18,7 @@ from rcbook.signals import signal
 class Passes:
     """Signals of passes 0, 1, ..: one row per pass, one column per sample, units of the plant.
 
-    The record ends before the pass in which a signal exceeds 1e9 times the largest input, and is
+    The record ends before the pass in which a signal exceeds 1e30 times the largest input, and is
     `unbounded` then.
     """
 
