@@ -11,6 +11,7 @@ from scipy.sparse.linalg import splu
 from rcbook.loops.periodic.recursion import Recursion
 
 _BLOCK = 32  # samples; the matrices are small and their products large enough to be worth it
+_AT_ONCE = 40  # columns; larger products are threaded, which takes longer than they do
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +39,9 @@ class Blocks:
             read = timeline[reads]
             live = np.flatnonzero((np.abs(read) > floor[self.kind[reads], None]).any(axis=0))
             timeline[writes] = 0.0
-            timeline[writes, live] = matrix @ read[:, live]
+            for i in range(0, live.size, _AT_ONCE):
+                some = live[i : i + _AT_ONCE]
+                timeline[writes, some] = matrix @ read[:, some]
 
 
 def blocks(once: Recursion, command: bool = False) -> Blocks:
