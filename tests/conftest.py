@@ -73,9 +73,12 @@ def make(tmp_path):
         ignore = shutil.ignore_patterns("_build")
         shutil.copytree(ROOT / "book", tmp_path / "book", ignore=ignore)
         contents = tmp_path / "book" / "_toc.yml"
-        chapters = re.compile(r"(      - file: notebooks/.*\n)+")
-        text = chapters.sub("      - glob: notebooks/*\n", contents.read_text(encoding="utf-8"))
-        contents.write_text(text, encoding="utf-8")
+        parts = r"(  - caption: .*\n    chapters:\n(?:      - file: notebooks/.*\n)+)+"
+        one = "  - caption: Chapters\n    chapters:\n      - glob: notebooks/*\n"
+        contents.write_text(re.sub(parts, one, contents.read_text("utf-8")), encoding="utf-8")
+        landing = tmp_path / "book" / "index.md"  # without links to chapters that are not here
+        unlinked = re.sub(r"\[([^]]+)\]\(notebooks/[^)]+\)", r"\1", landing.read_text("utf-8"))
+        landing.write_text(unlinked, encoding="utf-8")
         return Project(tmp_path, (module.PAPER,))
 
     return make
