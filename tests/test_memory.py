@@ -225,6 +225,7 @@ def test_a_small_gain_shrinks_each_harmonic_by_half_the_gain_a_sample():
         (lambda: RepetitiveController(INVERSE, 12, 0), ValueError, "repetitive gain"),
         (lambda: RepetitiveController(memory.lead(13), 12, 1), ValueError, "13 samples ahead"),
         (lambda: RepetitiveController(PLANT, 12, 1), TypeError, "lead"),
+        (lambda: memory.lead(-2), ValueError, "samples = -2.*looks ahead"),
         (lambda: memory.resonators(PLANT, 12, [], 1), ValueError, "name each"),
         (lambda: memory.resonators(PLANT, 12, [1, 1], 1), ValueError, "once"),
         (lambda: memory.resonators(PLANT, 12, [7], 1), ValueError, "harmonic 7"),

@@ -107,7 +107,8 @@ def odd_harmonic(period: float, q: ArrayLike = (1.0,)) -> Memory:
 def several(*memories: Memory) -> Memory:
     """H1 + H2 - H1 H2 and so on: learns what any of them learns, so 1 - H = (1 - H1)(1 - H2) ..
 
-    The same memory twice is one of second order, which forgives an error of the period.
+    The same memory twice is one of second order, which forgives an error of the period.  The period
+    of several is the longest of theirs.
     Raises ValueError without a memory, and TypeError for what is none.
     """
     if not memories:
@@ -194,7 +195,11 @@ class RepetitiveController:
 
 
 def lead(samples: int, gain: float = 1.0) -> NoncausalFilter:
-    """gain z^samples: the compensator of a plant of which little more than its delay is known."""
+    """gain z^samples: the compensator of a plant of which little more than its delay is known.
+
+    Raises ValueError for samples that are not whole or negative, and a gain that is not finite.
+    """
+    samples = zdomain.whole_number(samples, "samples", 0, "a lead looks ahead; give 0 or more")
     return NoncausalFilter([zdomain.real_number(gain, "gain")], [1.0], samples)
 
 
