@@ -93,5 +93,5 @@ def test_the_new_chapter_stands_after_the_last_one(clone):
     lines = (clone / "book" / "_toc.yml").read_text(encoding="utf-8").splitlines()
     at = lines.index("      - file: notebooks/smith2001")
     assert lines[at - 1].startswith("      - file: notebooks/")
-    assert not lines[at + 1].startswith("      - file: notebooks/")
+    assert not any(line.startswith("      - file: notebooks/") for line in lines[at + 1 :])
     assert "@misc{smith2001," in (clone / "book" / "references.bib").read_text(encoding="utf-8")

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rcbook.book.project import Project, read_text, write
 
-_LAST = re.compile(r"(?:^ +- file: notebooks/.*\n)+", re.MULTILINE)
+_CHAPTER = re.compile(r"^ +- file: notebooks/.*\n", re.MULTILINE)
 
 
 def create(project: Project, key: str, title: str = "") -> list[Path]:
@@ -70,11 +70,12 @@ def _write_all(texts: Mapping[Path, str], before: Mapping[Path, str]) -> None:
 
 def _listed(contents: str, key: str) -> str:
     """The table of contents with a line for the new chapter after the last one."""
-    chapters = _LAST.search(contents)
-    if chapters is None:
+    chapters = list(_CHAPTER.finditer(contents))
+    if not chapters:
         raise ValueError("book/_toc.yml lists no chapter in notebooks/; restore it first")
-    line = re.sub(r"notebooks/.*", f"notebooks/{key}", chapters[0].splitlines()[-1])
-    return contents[: chapters.end()] + line + "\n" + contents[chapters.end() :]
+    last = chapters[-1]
+    line = re.sub(r"notebooks/.*", f"notebooks/{key}", last[0])
+    return contents[: last.end()] + line + contents[last.end() :]
 
 
 def _filled(name: str, values: dict[str, str]) -> str:
