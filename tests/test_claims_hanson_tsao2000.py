@@ -350,15 +350,3 @@ def test_half_is_no_dip_and_one_turn_gains_nothing():
     assert 2.0 < half < 2.2
     constant = float(chatter.lobes(CUT.mode, CUT.speed)[0]) / K0
     assert once == pytest.approx(constant, rel=2e-3)
-
-
-# ---- roots ----
-
-
-def test_a_first_crossing_is_a_root_or_an_edge_or_nowhere():
-    edges = (0.0, 1.0, 2.0, 3.0)
-    assert periodic.first_crossing(lambda x: x**2 - 2, edges) == pytest.approx(np.sqrt(2), abs=1e-6)
-    assert periodic.first_crossing(lambda x: 1.0 + x, edges) == 0.0
-    assert periodic.first_crossing(lambda x: -1.0, edges) == np.inf
-    with pytest.raises(ValueError, match="ascending order"):
-        periodic.first_crossing(lambda x: x, (1.0, 0.0))

@@ -248,3 +248,40 @@ BAD = {
 def test_bad_input_names_value_and_mend(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+# ---- between the samples, and at the limits of the feed ----
+
+
+def test_between_samples_of_a_parabola_a_straight_path_is_off_by_a_quarter():
+    """k^2 between k and k + 1 lies below its chord by at most 1/4, in the middle."""
+    n = 6
+    shape = lambda k: np.minimum(k, n - k) ** 2  # noqa: E731  two arcs, meeting at n/2
+    assert lathe.error_between(shape(np.arange(n)), shape, 10) == pytest.approx(0.25, rel=1e-12)
+    off = shape(np.arange(n)) + np.eye(n)[2]  # the chord rises with the sample that is off
+    assert lathe.error_between(off, shape, 10) == pytest.approx(1.0, abs=0.26)
+    assert lathe.error_between(np.full(5, 2.0), lambda k: 0 * k + 3.0) == 1.0
+
+
+def test_a_command_within_its_limits_is_followed_and_a_step_at_the_limits():
+    wave = np.sin(2 * np.pi * np.arange(20) / 20)
+    np.testing.assert_allclose(lathe.rate_limited(wave, 0.1, 3.2), wave, atol=1e-13)
+    step = np.repeat([0.0, 8.0], 40)
+    ramp = lathe.rate_limited(step, 0.5, 2.0)  # one unit a sample up, and as fast down
+    expected = np.interp(np.arange(80), [0, 7, 39, 47, 79], [7, 0, 0, 8, 8])
+    np.testing.assert_allclose(ramp, expected, atol=1e-12)
+    speeds = np.diff(lathe.rate_limited(step, 0.5, 4.0, 0.8))
+    assert np.abs(speeds).max() <= 2.0 + 1e-12
+    assert np.abs(np.diff(speeds)).max() == pytest.approx(0.2, abs=1e-12)  # 0.8 x 0.5^2
+
+
+@pytest.mark.parametrize(
+    "call, message",
+    [
+        (lambda: lathe.error_between(np.ones(5), np.sin, 0), r"points = 0 .*round"),
+        (lambda: lathe.rate_limited(np.ones(5), 0.1, 0.0), r"speed = 0\.0 must be pos"),
+    ],
+)
+def test_motion_refuses_what_cannot_be(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()

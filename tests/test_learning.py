@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from learning_cases import LAG, Q1, Q2, RESTS, SEEDS, SERVO, each_plant, each_seed
 from oracles.learning import (
     by_definition,
     circulant,
@@ -14,7 +15,6 @@ from oracles.learning import (
     spectral_error,
 )
 
-from rcbook import zdomain
 from rcbook.loops import learning, repetitive
 from rcbook.loops.learning import CONTINUOUS, PERIODIC, RESET, LearningLaw, Scheme, Start
 from rcbook.loops.repetitive import Loop, RepetitiveController
@@ -22,20 +22,9 @@ from rcbook.loops.run import BOUND, Limit, Limits
 from rcbook.machines import lathe
 from rcbook.zdomain import NoncausalFilter, Plant
 
-SEEDS = range(4)
-SERVO = lathe.LEE_OH_KIM
-LAG = Plant([0.5], [1, -0.5], 1, 1.0)
-LATE = Plant([0.5, 0.2], [1, -0.9, 0.1], 2, 1.0)
-OUTSIDE = Plant([0.3, -0.9, 0.5], [1, -0.5], 1, 1.0)
-PLANTS = {"lathe": SERVO.plant, "nc": lathe.LEE_OH_KIM_NC.plant, "late": LATE, "outside": OUTSIDE}
-Q1 = zdomain.binomial_q(1)
-Q2 = zdomain.symmetric_fir([0.8, 0.1, -0.02])
-RESTS = [Start("rest", after) for after in ("itself", "on", "nothing")]
 FORGETFUL = [Start(s.before, s.after, True) for s in (CONTINUOUS, *RESTS)]
 STARTS = [PERIODIC, CONTINUOUS, *RESTS, *FORGETFUL]
 each_start = pytest.mark.parametrize("start", STARTS, ids=str)
-each_plant = pytest.mark.parametrize("plant", PLANTS.values(), ids=PLANTS)
-each_seed = pytest.mark.parametrize("seed", SEEDS)
 
 
 def make(q=(1.0,), gain=0.7, plant=None):
@@ -471,31 +460,6 @@ def test_mismatch_is_the_ratio_of_the_plants(seed):
     np.testing.assert_array_equal(learning.mismatch(replace(scheme, model=None), z), 0)
 
 
-# ---- what a machine makes of learned samples ----
-
-
-def test_between_samples_of_a_parabola_a_straight_path_is_off_by_a_quarter():
-    """k^2 between k and k + 1 lies below its chord by at most 1/4, in the middle."""
-    n = 6
-    shape = lambda k: np.minimum(k, n - k) ** 2  # noqa: E731  two arcs, meeting at n/2
-    assert learning.error_between(shape(np.arange(n)), shape, 10) == pytest.approx(0.25, rel=1e-12)
-    off = shape(np.arange(n)) + np.eye(n)[2]  # the chord rises with the sample that is off
-    assert learning.error_between(off, shape, 10) == pytest.approx(1.0, abs=0.26)
-    assert learning.error_between(np.full(5, 2.0), lambda k: 0 * k + 3.0) == 1.0
-
-
-def test_a_command_within_its_limits_is_followed_and_a_step_at_the_limits():
-    wave = np.sin(2 * np.pi * np.arange(20) / 20)
-    np.testing.assert_allclose(learning.rate_limited(wave, 0.1, 3.2), wave, atol=1e-13)
-    step = np.repeat([0.0, 8.0], 40)
-    ramp = learning.rate_limited(step, 0.5, 2.0)  # one unit a sample up, and as fast down
-    expected = np.interp(np.arange(80), [0, 7, 39, 47, 79], [7, 0, 0, 8, 8])
-    np.testing.assert_allclose(ramp, expected, atol=1e-12)
-    speeds = np.diff(learning.rate_limited(step, 0.5, 4.0, 0.8))
-    assert np.abs(speeds).max() <= 2.0 + 1e-12
-    assert np.abs(np.diff(speeds)).max() == pytest.approx(0.2, abs=1e-12)  # 0.8 x 0.5^2
-
-
 # ---- mutants: each key check can fail ----
 
 
@@ -681,10 +645,6 @@ BAD = {
         r"'moon' to 'output': sources"),
     "no points": (lambda: learning.contraction(scheme(), 0), r"points = 0 .*round"),
     "roots of passes": (lambda: learning.roots(scheme()), r"itself.* ask for multipliers"),
-    "limit that never held": (lambda: learning.first_failure(lambda x: x, [1.5, 2.0]),
-        r"1\.5 fails already; begin"),
-    "no points between": (lambda: learning.error_between(FIVE, np.sin, 0), r"points = 0 .*round"),
-    "standing still": (lambda: learning.rate_limited(FIVE, 0.1, 0.0), r"speed = 0\.0 must be pos"),
     "lopsided q": (lambda: LearningLaw(H.filter, [0.2, 0.5, 0.3]), r"0\.3.* symmetric"),
     "even q": (lambda: learning.p_type_law(1.0, 1, [0.5, 0.5]), r"0\.5.* symmetric"),
     "NaN gain": (lambda: learning.zero_phase_law(P, NAN), r"gain = nan must be"),

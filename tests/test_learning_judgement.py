@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from learning_cases import LAG, LATE, Q1, Q2, RESTS, SERVO, each_plant, each_seed
 from oracles.learning import (
     circulant_sources,
     companion_radius,
@@ -17,21 +18,9 @@ from rcbook.loops import learning, repetitive
 from rcbook.loops.learning import CONTINUOUS, PERIODIC, RESET, LearningLaw, Scheme, Start
 from rcbook.loops.repetitive import Loop, Process, RepetitiveController
 from rcbook.loops.verdict import OUTPUTS, SOURCES
-from rcbook.machines import lathe
 from rcbook.zdomain import NoncausalFilter, Plant
 
-SEEDS = range(4)
-SERVO = lathe.LEE_OH_KIM
-LAG = Plant([0.5], [1, -0.5], 1, 1.0)
-LATE = Plant([0.5, 0.2], [1, -0.9, 0.1], 2, 1.0)
-OUTSIDE = Plant([0.3, -0.9, 0.5], [1, -0.5], 1, 1.0)
-PLANTS = {"lathe": SERVO.plant, "nc": lathe.LEE_OH_KIM_NC.plant, "late": LATE, "outside": OUTSIDE}
-Q1 = zdomain.binomial_q(1)
-Q2 = zdomain.symmetric_fir([0.8, 0.1, -0.02])
-RESTS = [Start("rest", after) for after in ("itself", "on", "nothing")]
 FORGETFUL = Start("previous", "next", True)
-each_plant = pytest.mark.parametrize("plant", PLANTS.values(), ids=PLANTS)
-each_seed = pytest.mark.parametrize("seed", SEEDS)
 each_source = pytest.mark.parametrize("source", SOURCES)
 each_output = pytest.mark.parametrize("output", OUTPUTS)
 
@@ -301,16 +290,9 @@ def test_the_verdict_says_what_300_passes_do(start, gain, verdict):
 
 def test_the_largest_gain_that_eq_8_allows_is_the_closed_form():
     """G H = 0.5 k z/(z - 0.5) at gain k: farthest from one at z = 1, where it is k, or z = -1."""
-    measure = lambda k: learning.contraction(Scheme(LAG, learning.p_type_law(k, 1), 8))  # noqa: E731
-    assert learning.first_failure(measure, [0.5, 5.0]) == pytest.approx(2, rel=1e-9)
-    assert learning.first_failure(measure, [0.5, 1.0, 1.9]) == np.inf
-
-
-def test_the_first_of_several_failures_is_found_going_either_way():
-    measure = lambda x: 1 + np.sin(x)  # noqa: E731  fails between 0 and pi, and again from 2 pi on
-    assert learning.first_failure(measure, np.arange(-1.0, 20, 0.5)) == pytest.approx(0, abs=1e-11)
-    assert learning.first_failure(measure, np.arange(5.0, 0, -0.5)) == pytest.approx(np.pi)
-    assert learning.first_failure(measure, [4.0, 7.0]) == pytest.approx(2 * np.pi)
+    excess = lambda k: learning.contraction(Scheme(LAG, learning.p_type_law(k, 1), 8)) - 1  # noqa: E731
+    assert zdomain.first_crossing(excess, [0.5, 5.0]) == pytest.approx(2, rel=1e-9)
+    assert zdomain.first_crossing(excess, [0.5, 1.0, 1.9]) == np.inf
 
 
 # ---- the learned limit ----

@@ -140,6 +140,12 @@ def test_the_zero_phase_inverse_makes_the_plain_factor_real(kind):
     np.testing.assert_allclose(found / kind.gain(z) - (1 - compensated.real), 0, atol=1e-12)
 
 
+def test_the_gain_bound_is_taken_along_the_first_axis_alone():
+    """|1 - k g| < 1 up to k = 2 Re g/|g|^2: 2 for one, 1 for 1 + j, never for -1."""
+    g = np.array([[1.0, 1.0, 1.0], [1.0, 1 + 1j, -1.0]])
+    np.testing.assert_allclose(memory.gain_bound(g), [2, 1, 0], atol=1e-15)
+
+
 # ---- controllers ----
 
 
@@ -225,6 +231,7 @@ def test_a_small_gain_shrinks_each_harmonic_by_half_the_gain_a_sample():
         (lambda: RepetitiveController(INVERSE, 12, 0), ValueError, "repetitive gain"),
         (lambda: RepetitiveController(memory.lead(13), 12, 1), ValueError, "13 samples ahead"),
         (lambda: RepetitiveController(PLANT, 12, 1), TypeError, "lead"),
+        (lambda: memory.gain_bound([1.0, np.nan]), ValueError, "leave out the poles"),
         (lambda: memory.lead(-2), ValueError, "samples = -2.*looks ahead"),
         (lambda: memory.resonators(PLANT, 12, [], 1), ValueError, "name each"),
         (lambda: memory.resonators(PLANT, 12, [1, 1], 1), ValueError, "once"),

@@ -635,17 +635,17 @@ def test_factor_is_the_response_of_a_lasting_sample():
 # ---- searches ----
 
 
-def test_the_gain_limit_is_where_a_long_loop_turns_unstable():
+def test_the_frozen_gain_bound_is_where_a_long_loop_turns_unstable():
     """At N = 96 the lowest mode lies at pi/N, where g is one within 1e-3; scaled taps scale it."""
     loop = bar_loop(96, 0.0)
-    limit = periodic.gain_limit(loop)
+    limit = periodic.frozen_gain_bound(loop)
     assert limit == pytest.approx(2.0, rel=1e-9)  # all b are positive: g(1) = 1
     assert periodic.verdict(replace(loop, gain=0.999 * limit)).verdict == "stable"
     assert periodic.verdict(replace(loop, gain=1.01 * limit)).verdict == "unstable"
     halved = replace(loop.compensator, taps=loop.compensator.taps / 2)
-    assert periodic.gain_limit(replace(loop, compensator=halved)) == pytest.approx(2 * limit)
+    assert periodic.frozen_gain_bound(replace(loop, compensator=halved)) == pytest.approx(2 * limit)
     late = replace(loop.compensator, advance=loop.advance - 1)
-    assert periodic.gain_limit(replace(loop, compensator=late)) == 0.0
+    assert periodic.frozen_gain_bound(replace(loop, compensator=late)) == 0.0
 
 
 def test_at_a_vanishing_interval_a_zero_is_minus_one():

@@ -580,3 +580,31 @@ def test_the_boundary_is_no_farther_than_asked_and_begins_where_it_holds():
             zdomain.boundary(lambda x: True, bad, 1.0, 1e-3)
     with pytest.raises(ValueError, match=r"precision = 0\.0"):
         zdomain.boundary(lambda x: x < 2, 1.0, 9.0, 0.0)
+
+
+def test_a_first_crossing_is_a_root_or_an_edge_or_nowhere():
+    edges = (0.0, 1.0, 2.0, 3.0)
+    assert zdomain.first_crossing(lambda x: x**2 - 2, edges) == pytest.approx(np.sqrt(2), abs=1e-6)
+    assert zdomain.first_crossing(lambda x: 1.0 + x, edges) == 0.0
+    assert zdomain.first_crossing(lambda x: -1.0, edges) == np.inf
+    with pytest.raises(ValueError, match="all upward"):
+        zdomain.first_crossing(lambda x: x, (1.0, 0.0, 0.5))
+
+
+def test_the_first_of_several_crossings_is_found_going_either_way():
+    edges = np.arange(-1.0, 20, 0.5)  # the sine rises through 0 and 2 pi and falls through pi
+    assert zdomain.first_crossing(np.sin, edges) == pytest.approx(0, abs=1e-11)
+    assert zdomain.first_crossing(np.sin, np.arange(5.0, 0, -0.5)) == pytest.approx(np.pi)
+    assert zdomain.first_crossing(np.sin, [4.0, 7.0]) == pytest.approx(2 * np.pi)
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.3, -0.9, 0.999])
+def test_white_noise_through_one_pole_has_the_variance_of_a_geometric_series(pole):
+    found = zdomain.rms_gain(np.array([2.0]), np.array([1.0, -pole]), abs(pole))
+    # rounding of a mean over as many points as the response is long
+    assert found == pytest.approx(2 / np.sqrt(1 - pole**2), rel=1e-12)
+
+
+def test_a_response_that_does_not_end_is_refused():
+    with pytest.raises(ValueError, match="too near 1"):
+        zdomain.rms_gain(np.ones(1), np.array([1.0, -1.0]), 1 - 1e-9)

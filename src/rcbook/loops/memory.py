@@ -138,6 +138,20 @@ def factor(memory: Memory, compensated: ArrayLike, z: ArrayLike) -> np.ndarray:
     return memory.gain(z) * (1 - np.asarray(compensated))
 
 
+def gain_bound(compensated: ArrayLike) -> np.ndarray:
+    """Largest gain k up to which |1 - k g| < 1 for all values g of C G along the first axis.
+
+    That is the least 2 Re g/|g|^2, and 0 where the real part of some g is not positive.
+    Raises ValueError for values that are not finite.
+    """
+    g = np.asarray(compensated, dtype=complex)
+    if not np.all(np.isfinite(g)):
+        raise ValueError("C G holds NaN or infinity; leave out the poles of the plant")
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bounds = np.where(g.real > 0, 2 * g.real / np.abs(g) ** 2, 0.0)
+    return bounds.min(axis=0)
+
+
 # ---- controllers ----
 
 

@@ -29,6 +29,9 @@ class Limits:
     repetitive: Limit = Limit()
 
 
+FREE = Limits()
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """Signals of one simulation, each of n samples, in the units of the plant.

@@ -23,6 +23,7 @@ from rcbook.zdomain.polynomials import (
     at_frequency,
     evaluate,
     multiply,
+    rms_gain,
     shift,
     sorted_roots,
     turns_round_origin,
@@ -41,7 +42,7 @@ from rcbook.zdomain.sampling import (
     phi2,
     zero_order_hold,
 )
-from rcbook.zdomain.search import boundary
+from rcbook.zdomain.search import boundary, first_crossing
 
 __all__ = [
     "NORMALISATIONS",
@@ -52,6 +53,7 @@ __all__ = [
     "binomial_q",
     "boundary",
     "evaluate",
+    "first_crossing",
     "interval_integral",
     "modes",
     "multiply",
@@ -61,6 +63,7 @@ __all__ = [
     "polynomial",
     "real_number",
     "response",
+    "rms_gain",
     "shift",
     "sorted_roots",
     "split_zeros",

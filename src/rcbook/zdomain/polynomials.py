@@ -37,6 +37,24 @@ def evaluate(p: np.ndarray, z: ArrayLike) -> np.ndarray:
     return np.polynomial.polynomial.polyval(1 / np.asarray(z), p)
 
 
+def rms_gain(numerator: np.ndarray, denominator: np.ndarray, largest_root: float) -> float:
+    """Root of the mean of |numerator/denominator|^2 over the unit circle: what white noise becomes.
+
+    The mean over n points is exact but for terms of the size largest_root^n, the largest root of
+    the denominator, and n is chosen to bring these below rounding.
+    Raises ValueError for a root so near the circle that the sum would not end.
+    """
+    root = max(largest_root, 0.5)
+    n = int(np.ceil(np.log(1e-17) / np.log(root))) + max(numerator.size, denominator.size)
+    if n > 5_000_000:
+        raise ValueError(
+            f"largest root {root:.9g} is too near 1 to sum the response; raise the gain"
+        )
+    return float(
+        np.sqrt(np.mean(np.abs(np.fft.fft(numerator, n) / np.fft.fft(denominator, n)) ** 2))
+    )
+
+
 def sorted_roots(p: np.ndarray) -> np.ndarray:
     """Roots in z of p(z^-1) away from the origin, by decreasing magnitude; real if all are."""
     roots = np.roots(np.trim_zeros(p, "b"))

@@ -10,7 +10,6 @@ so mismatch is one argument; a first command u_0 other than the reference is ano
 from rcbook.loops.learning.judgement import (
     contraction,
     factor,
-    first_failure,
     harmonic_contraction,
     mismatch,
     multipliers,
@@ -27,7 +26,6 @@ from rcbook.loops.learning.laws import (
 )
 from rcbook.loops.learning.noise import noise_gain
 from rcbook.loops.learning.passes import Passes, simulate, track
-from rcbook.loops.learning.path import error_between, rate_limited
 from rcbook.loops.learning.scheme import CONTINUOUS, PERIODIC, RESET, Scheme, Start
 from rcbook.loops.run import Limit, Limits
 from rcbook.loops.verdict import Verdict
@@ -44,16 +42,13 @@ __all__ = [
     "Start",
     "Verdict",
     "contraction",
-    "error_between",
     "factor",
-    "first_failure",
     "harmonic_contraction",
     "mismatch",
     "multipliers",
     "noise_gain",
     "norm_optimal_law",
     "p_type_law",
-    "rate_limited",
     "roots",
     "simulate",
     "spectral_radius",

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable
-
 import numpy as np
-import scipy.optimize
 from numpy.typing import ArrayLike
 
 from rcbook import zdomain
@@ -14,7 +10,6 @@ from rcbook.loops import memory
 from rcbook.loops.learning.passes import Passes, one_period, one_row
 from rcbook.loops.learning.scheme import Scheme, answer, circular, one_pass
 from rcbook.loops.verdict import Verdict, judged, require_stable
-from rcbook.signals import signal
 
 
 def factor(scheme: Scheme, z: ArrayLike) -> np.ndarray:
@@ -47,22 +42,6 @@ def harmonic_contraction(scheme: Scheme) -> np.ndarray:
     """|q (1 - G H)| at the harmonics 0 .. period/2, on which alone a periodic pass depends."""
     harmonics = zdomain.unit_circle(scheme.period)
     return np.abs(factor(scheme, harmonics[: harmonics.size // 2 + 1]))
-
-
-def first_failure(measure: Callable[[float], float], values: ArrayLike) -> float:
-    """Where `measure` first reaches one as its argument goes along `values`; infinite if nowhere.
-
-    The crossing between the last value that holds and the first that does not is refined to
-    rounding; what happens and ends between two values is not seen.
-    Raises ValueError when the first value fails already.
-    """
-    values = signal(values, "values")
-    if not measure(values[0]) < 1:
-        raise ValueError(f"{values[0]:g} fails already; begin the values where the measure holds")
-    for good, bad in itertools.pairwise(values):
-        if measure(bad) >= 1:
-            return float(scipy.optimize.brentq(lambda value: measure(value) - 1, good, bad))
-    return np.inf
 
 
 # ---- stability ----

@@ -95,15 +95,9 @@ def _direct(g: np.ndarray, output: str, source: str) -> np.ndarray:
 
 
 def _running(scheme: Scheme, output: str, source: str) -> float:
-    """Mean of |transfer|^2 over enough points of the circle for the rest to be rounding."""
-    radius = max(float(np.abs(scheme.roots).max(initial=0.0)), 0.5)
-    n = int(np.ceil(np.log(1e-17) / np.log(radius))) + scheme.polynomial.size
-    if n > 5_000_000:
-        raise ValueError(
-            f"largest root {radius:.9g} is too near 1 to sum the response; raise the gain"
-        )
-    numerator = np.fft.fft(_numerator(scheme, output, source), n)
-    return np.mean(np.abs(numerator / np.fft.fft(scheme.polynomial, n)) ** 2)
+    """Variance of a continuous run in the end."""
+    largest = float(np.abs(scheme.roots).max(initial=0.0))
+    return zdomain.rms_gain(_numerator(scheme, output, source), scheme.polynomial, largest) ** 2
 
 
 def _numerator(scheme: Scheme, output: str, source: str) -> np.ndarray:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from rcbook import zdomain
 from rcbook.loops.learning.scheme import Scheme, circular, one_pass, require_repeating, resting
-from rcbook.loops.run import BOUND, Limit, Limits
+from rcbook.loops.run import BOUND, FREE, Limits
 from rcbook.signals import signal
 
 
@@ -61,7 +61,7 @@ def simulate(
     rest: float = 0.0,
     disturbance: ArrayLike | None = None,
     noise: ArrayLike | None = None,
-    limits: Limits = Limits(),  # noqa: B008  frozen
+    limits: Limits = FREE,
 ) -> Passes:
     """Run pass 0, with the command `first` (the reference), and then `passes` learned ones.
 
@@ -114,7 +114,7 @@ def _run_apart(scheme, r, w, noise, first, rest, limit, bound):
     return np.array(commands), np.array(outputs)
 
 
-def run_on(scheme, r, w, noise, first, rest, limit=Limit(), bound=np.inf):  # noqa: B008  frozen
+def run_on(scheme, r, w, noise, first, rest, limit=FREE.command, bound=np.inf):
     """One continuous run: every pass begins in the state in which the last one ended.
 
     Pass 0 is commanded by `first`, all of it.  Before the run there was no error and nothing was

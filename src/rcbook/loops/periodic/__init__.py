@@ -37,7 +37,7 @@ from rcbook.loops.periodic.loop import PeriodicLoop, factor, mismatch
 from rcbook.loops.periodic.noise import noise_gain
 from rcbook.loops.periodic.plant import PeriodicPlant, balanced, between_samples, sample
 from rcbook.loops.periodic.response import simulate, steady_state
-from rcbook.loops.periodic.search import first_crossing, gain_limit, vanishing_intervals
+from rcbook.loops.periodic.search import frozen_gain_bound, vanishing_intervals
 from rcbook.loops.periodic.verdict import verdict
 from rcbook.loops.run import Limit, Limits, Run
 from rcbook.loops.verdict import OUTPUTS, SOURCES, Verdict

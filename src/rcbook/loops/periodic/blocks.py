@@ -23,8 +23,7 @@ class Blocks:
 
     parts: list[tuple[np.ndarray, slice, np.ndarray]]  # where it reads, where it writes, matrix
     last: np.ndarray  # where in the timeline the next state stands
-    w: np.ndarray  # where w, u and v stand, a row a sample
-    u: np.ndarray
+    w: np.ndarray  # where w and v stand, a row a sample
     v: np.ndarray  # -1 where it is left out
     past_u: np.ndarray  # where u(k-L) stands
     kind: np.ndarray  # of a row of the timeline: 0 for w, u and v, else which of the x
@@ -68,4 +67,4 @@ def blocks(once: Recursion, command: bool = False) -> Blocks:
         parts.append((place[reads], slice(at[0], at[-1] + 1), answer[written]))
     w, u, v = (place[size + step * np.arange(n) + i] for i in range(3))
     past_u = np.concatenate([order + once.reach + np.arange(-once.advanced, 0), u])[:n]
-    return Blocks(parts, place[once.last], w, u, v, past_u, kind, order)
+    return Blocks(parts, place[once.last], w, v, past_u, kind, order)

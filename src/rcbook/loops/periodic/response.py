@@ -12,11 +12,10 @@ from scipy.sparse.linalg import splu
 from rcbook.loops.periodic.loop import PeriodicLoop
 from rcbook.loops.periodic.recursion import Recursion
 from rcbook.loops.periodic.verdict import verdict
-from rcbook.loops.run import BOUND, Limits, Run
+from rcbook.loops.run import BOUND, FREE, Limits, Run
 from rcbook.loops.verdict import require_stable
 from rcbook.signals import signal
 
-_FREE = Limits()
 _MEND = "choose another design or gain, or shorten q"
 
 
@@ -26,7 +25,7 @@ def simulate(
     *,
     disturbance: ArrayLike | None = None,
     noise: ArrayLike | None = None,
-    limits: Limits = _FREE,
+    limits: Limits = FREE,
 ) -> Run:
     """Run the loop from rest, limits included; without limits a period is one sparse solve.
 
@@ -37,7 +36,7 @@ def simulate(
     """
     inputs = _inputs(reference, disturbance, noise)
     limit = BOUND * np.abs(inputs).max()
-    periods = _linear if limits == _FREE else _limited
+    periods = _linear if limits == FREE else _limited
     found = []
     for signals in periods(loop, inputs, limits):
         found.append(signals)

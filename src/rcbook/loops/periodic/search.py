@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import control
 import numpy as np
@@ -12,30 +10,12 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize_scalar
 
 from rcbook import zdomain
+from rcbook.loops.memory import gain_bound
 from rcbook.loops.periodic.loop import PeriodicLoop, factor
 from rcbook.loops.periodic.plant import balanced, positive_intervals
 
 
-def first_crossing(
-    function: Callable[[float], float], edges: Sequence[float], precision: float = 1e-7
-) -> float:
-    """Where `function` first reaches zero from below: searched from edge to edge, then a root.
-
-    It is the first edge where the function is not below zero there, and infinite where it stays
-    below at all of them; what happens between two edges can be missed.
-    Raises ValueError for fewer than two edges or edges that do not ascend.
-    """
-    if len(edges) < 2 or not np.all(np.diff(edges) > 0):
-        raise ValueError(f"edges = {list(edges)}: give two or more, in ascending order")
-    if function(edges[0]) >= 0:
-        return float(edges[0])
-    for low, high in pairwise(edges):
-        if function(high) >= 0:
-            return float(brentq(function, low, high, xtol=precision))
-    return np.inf
-
-
-def gain_limit(loop: PeriodicLoop) -> float:
+def frozen_gain_bound(loop: PeriodicLoop) -> float:
     """Largest gain k with |1 - k g| <= 1 on the unit circle, for the compensated plant g frozen.
 
     At constant intervals and without q a loop below it is stable whatever its period.  It is 0
@@ -44,8 +24,7 @@ def gain_limit(loop: PeriodicLoop) -> float:
     unit, angles = replace(loop, gain=1.0, memory=None), np.linspace(0, np.pi, 721)
 
     def bearable(angle: ArrayLike) -> np.ndarray:
-        g = 1 - factor(unit, np.exp(1j * np.atleast_1d(angle)))
-        return (2 * g.real / np.abs(g) ** 2).min(axis=0)
+        return gain_bound(1 - factor(unit, np.exp(1j * np.atleast_1d(angle))))
 
     coarse = bearable(angles)
     worst = angles[np.argmin(coarse)]
@@ -53,7 +32,7 @@ def gain_limit(loop: PeriodicLoop) -> float:
     found = minimize_scalar(
         lambda angle: bearable(angle)[0], bounds=bounds, method="bounded", options={"xatol": 1e-12}
     )
-    return float(max(min(found.fun, coarse.min()), 0.0))
+    return float(min(found.fun, coarse.min()))
 
 
 def vanishing_intervals(system: control.StateSpace, intervals: ArrayLike) -> list[float]:

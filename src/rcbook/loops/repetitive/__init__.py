@@ -8,6 +8,7 @@ from rcbook.loops.memory import (
     Memory,
     RepetitiveController,
     Resonators,
+    gain_bound,
     lead,
     odd_harmonic,
     plain,
@@ -34,7 +35,6 @@ from rcbook.loops.repetitive.response import (
 )
 from rcbook.loops.repetitive.search import (
     acceptable_gains,
-    gain_bound,
     meeting_gains,
     swings,
 )

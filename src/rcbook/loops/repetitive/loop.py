@@ -115,7 +115,8 @@ class Loop:
     @property
     def look_ahead(self) -> float:
         """Samples by which the controller looks ahead of a period ago; 0 without a memory."""
-        return getattr(self.repetitive, "look_ahead", 0)
+        remembers = isinstance(self.repetitive, RepetitiveController)
+        return self.repetitive.look_ahead if remembers else 0
 
     def with_gain(self, gain: float) -> Loop:
         """The same loop at another repetitive gain.  Raises ValueError when it has none."""

@@ -11,13 +11,12 @@ from numpy.typing import ArrayLike
 from rcbook import zdomain
 from rcbook.loops.repetitive.loop import Loop, Process, as_loop, characteristic_polynomial
 from rcbook.loops.repetitive.stability import require_stable
-from rcbook.loops.run import BOUND, Limits, Run
+from rcbook.loops.run import BOUND, FREE, Limits, Run
 from rcbook.loops.verdict import SOURCES, require_ends
 from rcbook.signals import signal
 from rcbook.zdomain import Plant, add, multiply
 
 System = Loop | Process | Plant
-_FREE = Limits()
 _SOLVED = ("output", "command", "repetitive")  # the other outputs are differences of these
 
 
@@ -61,7 +60,7 @@ def simulate(
     *,
     disturbance: ArrayLike | None = None,
     noise: ArrayLike | None = None,
-    limits: Limits = _FREE,
+    limits: Limits = FREE,
 ) -> Run:
     """Run the loop sample by sample from rest, limits included.
 
@@ -202,18 +201,10 @@ def sensitivity(loop: System, frequency: ArrayLike) -> np.ndarray:
 def noise_gain(loop: System, output: str = "output", source: str = "noise") -> float:
     """Standard deviation of an output per unit standard deviation of white noise at a source.
 
-    The mean of |transfer|^2 over n points of the circle is exact but for terms of the size
-    radius^n, radius being that of the largest root, and n is chosen to bring these below rounding.
-    Raises ValueError when the loop is not stable.
+    Raises ValueError when the loop is not stable, and as `zdomain.rms_gain` does.
     """
     loop = as_loop(loop)
     require_ends(output, source)
     require_stable(loop)
-    radius = max(np.abs(loop.roots).max(initial=0.0), 0.5)
-    n = int(np.ceil(np.log(1e-17) / np.log(radius))) + characteristic_polynomial(loop).size
-    if n > 5_000_000:
-        raise ValueError(
-            f"spectral radius {radius:.9g} is too near 1 to sum the response; raise the gain"
-        )
-    numerator, denominator = (np.fft.fft(p, n) for p in transfer(loop, source, output))
-    return float(np.sqrt(np.mean(np.abs(numerator / denominator) ** 2)))
+    largest = float(np.abs(loop.roots).max(initial=0.0))
+    return zdomain.rms_gain(*transfer(loop, source, output), largest)

@@ -16,15 +16,6 @@ from rcbook.loops.run import Run
 from rcbook.zdomain import evaluate
 
 
-def gain_bound(compensated: ArrayLike) -> float:
-    """Largest gain k up to which |1 - k g| < 1 for all values g of a compensated process.
-
-    That is the least 2 Re g/|g|^2, and 0 where the real part of some g is not positive.
-    """
-    g = signals.signal(np.real(compensated)) + 1j * signals.signal(np.imag(compensated))
-    return 0.0 if g.real.min() <= 0 else float(np.min(2 * g.real / np.abs(g) ** 2))
-
-
 def acceptable_gains(
     loop: Loop,
     gains: ArrayLike,
