@@ -1,8 +1,9 @@
 # make book: set up, execute every notebook, judge every claim, render book/_build/html/index.html
 # make test: set up, run the test suite        make check: as `book`, without rendering
+# make bench: time the library against what else would answer, and store the run (ten minutes)
 # PYTHON=/path/to/python3.12 chooses the interpreter.
 
-.PHONY: book test check clean
+.PHONY: book test check bench clean
 .DELETE_ON_ERROR:
 
 book: .venv/ready
@@ -13,6 +14,12 @@ check: .venv/ready
 
 test: .venv/ready
 	.venv/bin/python -m pytest
+
+# On one thread, as the notebooks run; stored only if every row could be measured.
+bench: .venv/ready
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 .venv/bin/python -m pytest benchmarks \
+	  --benchmark-quiet --benchmark-json=benchmarks/run.json.part
+	mv benchmarks/run.json.part benchmarks/run.json
 
 clean:
 	rm -rf .venv book/_build
