@@ -541,7 +541,7 @@ def test_html_escapes_everything_a_paper_can_say(folder):
     folder(GOOD.replace("it takes", "<script>alert('&')</script> it takes"))
     bundle = filled(folder)._repr_mimebundle_()
     page = bundle["text/html"]
-    assert "<script>" not in page and "&lt;script&gt;alert(&#x27;&amp;&#x27;)" in page
+    assert "<script>" not in page and "&lt;script&gt;alert('&amp;')" in page
     assert "<b>place</b>" not in page and "time &amp; &lt;b&gt;place" in page
     assert "fig. &lt;2&gt;" in page
     assert bundle[ledger.MIME] == filled(folder).rows()
@@ -553,6 +553,54 @@ def test_html_says_when_a_verdict_is_not_the_expected_one(folder):
     book.check("paper.a", 0.9)
     assert "(expected: reproduced)" in show.table(book.rows())
     assert "(expected" not in show.table(filled(folder).rows())
+
+
+def test_a_computation_is_one_line_that_unfolds_to_its_claims(folder):
+    book = filled(folder)
+    page = book.latest()._repr_mimebundle_()["text/html"]
+    line, table = page.split("</summary>")
+    assert line.startswith("<details") and "2 claims: " in line
+    assert "1 reproduced</span>" in line and "1 not reproduced</span>: <code>paper.b</code>" in line
+    assert "paper.a" not in line  # what is reproduced is counted and not named
+    assert table.count("<tr") == 3 and 'id="claim-paper.a"' in table
+    assert show.folded([]) == ""
+
+
+def test_a_flipped_verdict_stands_unfolded(folder):
+    book = Ledger.of("paper")
+    book.check("paper.a", 0.9)
+    assert (
+        '<details class="rcbook-verdicts" open>' in book.latest()._repr_mimebundle_()["text/html"]
+    )
+    assert " open>" in book._repr_mimebundle_()["text/html"]
+    assert " open>" not in filled(folder)._repr_mimebundle_()["text/html"]
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("$a < b$ & c", r"\(a &lt; b\) &amp; c"),
+        ("V_r(k-1) of k_r = 0.8", r"\(V_{r}(k-1)\) of \(k_{r}\) = 0.8"),
+        ("cos a_out, x_10", r"cos \(a_{\mathrm{out}}\), \(x_{\mathrm{10}}\)"),
+        ("keep_negative and_so_on, a_ _b", "keep_negative and_so_on, a_ _b"),
+    ],
+)
+def test_symbols_are_typeset(text, shown):
+    bare = show.math(text).replace('<span class="math notranslate nohighlight">', "")
+    assert bare.replace("</span>", "") == shown
+
+
+@pytest.mark.parametrize(
+    ("printed", "unit", "shown"),
+    [
+        ("0.75;0.24;3.1", "1;1;lb/mV", "0.75; 0.24; 3.1 lb/mV"),
+        ("0.75;0.24", "N", "0.75; 0.24 N"),
+        ("0.75; 0.24", "1", "0.75; 0.24"),
+        ("4", "N; mm", "4 N; mm"),
+    ],
+)
+def test_each_printed_number_has_its_unit(printed, unit, shown):
+    assert show.printed({"kind": "list", "printed": printed, "unit": unit}) == shown
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,5 @@
-// Filters the table of the ledger page by paper, verdict, role and free text; without this script the
-// page shows every claim.
+// Filters the table of the ledger page by paper, verdict, role and free text, and unfolds what a link
+// leads to; without this script the page shows every claim.
 "use strict";
 
 function filterLedger(form, rows) {
@@ -39,4 +39,15 @@ function startLedger() {
   update();
 }
 
+// A link to a claim in its chapter leads to a row of a folded table.
+function unfold() {
+  const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+  const folded = target && target.closest("details:not([open])");
+  if (!folded) return;
+  folded.open = true;
+  target.scrollIntoView({ block: "center" });
+}
+
 startLedger();
+unfold();
+window.addEventListener("hashchange", unfold);

@@ -120,8 +120,8 @@ def ledger_page(papers: Sequence[ledger.Paper], rows: Sequence[Mapping]) -> str:
         "flips, and how large the change may be before it does.\n\n"
         + _raw(
             f"{_filter(papers)}\n"
-            '<table class="rcbook-ledger rcbook-full" role="table" aria-label="Claims">'
-            f'<thead role="rowgroup"><tr role="row">{head}</tr></thead>'
+            '<table class="rcbook-ledger rcbook-cards rcbook-full" role="table" '
+            f'aria-label="Claims"><thead role="rowgroup"><tr role="row">{head}</tr></thead>'
             f'<tbody role="rowgroup">\n{body}\n</tbody></table>'
         )
         + "\n"
@@ -174,7 +174,8 @@ def _ledger_row(row: Mapping, paper: ledger.Paper) -> str:
     id = html.escape(row["id"])
     claim = (
         f"{show.math(row['says'])}<br><small>{show.math(row['where'])} · "
-        f'<a href="{_chapter(paper)}">{html.escape(row["notebook"])}</a> · '
+        f'<a href="{_chapter(paper)}#{show.anchor_of(row["id"])}">'
+        f"{show.math(_short(paper))}</a> · "
         f'<a href="#{id}"><code>{id}</code></a></small>'
     )
     cells = (
@@ -225,13 +226,11 @@ def _size(size: float, unit: str) -> str:
 
 
 def _verdict(row: Mapping, paper: ledger.Paper) -> str:
-    verdict = row["verdict"]
-    shown = f'<span class="rcbook-verdict" data-verdict="{verdict}">{verdict}</span>'
-    shown += f"<br><small>{row['role']}</small>"
+    shown = f"{show.verdict(row)}<br><small>{row['role']}</small>"
     if row["erratum"]:
         anchor = _anchor(row["paper"], row["erratum"])
         shown += f'<br><small><a href="errata.html#{anchor}">erratum</a></small>'
-    elif verdict == ledger.CORRECTED:
+    elif row["verdict"] == ledger.CORRECTED:
         anchor = _anchor(row["paper"], f"reading-{row['reading']}")
         title = show.math(paper.conventions[row["reading"]]["title"])
         shown += f'<br><small>reading: <a href="errata.html#{anchor}">{title}</a></small>'
@@ -279,7 +278,7 @@ def _deciding(row: Mapping) -> str:
     id = html.escape(row["id"])
     return (
         f': <a href="ledger.html#{id}"><code>{id}</code></a> '
-        f'<span class="rcbook-verdict" data-verdict="{row["verdict"]}">{row["verdict"]}</span>. '
+        f"{show.verdict(row)}. "
         f"<span>{show.math(row['reason'])}</span>"
     )
 

@@ -103,7 +103,7 @@ def _link(data: dict) -> None:
     if rows := data.pop(ledger.MIME, None):
         data["text/html"] = ledger.summary(rows, page=LEDGER)
     if rows := data.pop(ledger.SHOWN, None):
-        data["text/html"] = show.table(rows, reasons=False, page=LEDGER)
+        data["text/html"] = show.folded(rows, page=LEDGER)
 
 
 def mathjax() -> Path:

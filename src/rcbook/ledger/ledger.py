@@ -18,14 +18,13 @@ SHOWN = "application/vnd.rcbook.rows+json"  # rows that are only shown
 
 @dataclass(frozen=True)
 class Extract:
-    """Some rows of a ledger without reasons, to look at; only a `Ledger` delivers verdicts."""
+    """Some rows of a ledger, to look at folded; only a `Ledger` delivers verdicts."""
 
     rows: Sequence[Mapping]
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict:
         text = "\n".join(map(show.line, self.rows))
-        html = show.table(self.rows, reasons=False)
-        return {"text/plain": text, "text/html": html, SHOWN: list(self.rows)}
+        return {"text/plain": text, "text/html": show.folded(self.rows), SHOWN: list(self.rows)}
 
 
 @dataclass
@@ -91,11 +90,14 @@ class Ledger:
 
 
 def summary(rows: Sequence[Mapping], page: str = "") -> str:
-    """Counts of `rows`, and a table of those that are not simply reproduced, as HTML."""
+    """Counts of `rows` as HTML and, folded, a table of those that are not simply reproduced."""
     plain = (REPRODUCED, REPRODUCED)
     rest = [row for row in rows if (row["verdict"], row["expected_verdict"]) != plain]
-    table = show.table(rest, page=page)
-    return f"<p>{show.counts(rows)}. All but the reproduced ones:</p>{table}"
+    flips = sum(row["verdict"] != row["expected_verdict"] for row in rows)
+    found = f"<p>{show.counts(rows)}.</p>"
+    if rest:
+        found += show.details("All but the reproduced ones", show.table(rest, page=page), flips > 0)
+    return found
 
 
 def _row(paper: Paper, judgement: Judgement) -> dict:

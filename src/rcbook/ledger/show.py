@@ -7,10 +7,13 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
-from rcbook.ledger.claim import SCORED, VERDICTS
+from rcbook.ledger.claim import REPRODUCED, SCORED, VERDICTS
 
 _LONG = 8  # a longer list is shown by its ends
-_MATH = re.compile(r"\$([^$]+)\$")
+# Mathematics as authors mark it, and symbols with an index as they come in words: k_r, y_m(k+1).
+_MATH = re.compile(
+    r"\$([^$]+)\$|\b([A-Za-z]{1,2})_([A-Za-z]{1,3}|\d+|[a-z]\d)\b((?:\([a-z][-+a-z0-9]*\))?)"
+)
 
 
 def line(row: Mapping) -> str:
@@ -22,9 +25,14 @@ def line(row: Mapping) -> str:
 
 
 def printed(row: Mapping) -> str:
-    """What the paper prints for a ledger row, with its unit where it is a number."""
-    bare = row["kind"] == "statement" or row["unit"] in ("", "1")
-    return row["printed"] if bare else f"{row['printed']} {row['unit']}"
+    """What the paper prints for a ledger row, each number of it with its unit."""
+    if row["kind"] == "statement":
+        return row["printed"]
+    values, units = (re.split(r";\s*", row[name]) for name in ("printed", "unit"))
+    if len(units) != len(values):
+        values, units = ["; ".join(values)], ["; ".join(units)]
+    pairs = zip(values, units, strict=True)
+    return "; ".join(v if u in ("", "1") else f"{v} {u}" for v, u in pairs)
 
 
 def value(computed: object) -> str:
@@ -46,39 +54,97 @@ def value(computed: object) -> str:
 
 
 def math(text: str) -> str:
-    """`text` escaped for HTML, its `$...$` marked for MathJax."""
-    mark = r'<span class="math notranslate nohighlight">\\(\1\\)</span>'
+    """`text` escaped for HTML, its mathematics and its symbols with an index marked for MathJax."""
+
+    def mark(found: re.Match) -> str:
+        tex, letter, index, argument = found.groups()
+        upright = index if tex or len(index) == 1 else rf"\mathrm{{{index}}}"
+        tex = tex or f"{letter}_{{{upright}}}{argument}"
+        return rf'<span class="math notranslate nohighlight">\({tex}\)</span>'
+
     return _MATH.sub(mark, html.escape(text, quote=False))
 
 
-def table(rows: Sequence[Mapping], reasons: bool = True, page: str = "") -> str:
+def verdict(row: Mapping) -> str:
+    """The verdict of a row with its mark, and what was expected where it is another one."""
+    found = html.escape(row["verdict"])
+    shown = f'<span class="rcbook-verdict" data-verdict="{found}">{found}</span>'
+    if row["verdict"] != row["expected_verdict"]:
+        shown += f" <b>(expected: {html.escape(row['expected_verdict'])})</b>"
+    return shown
+
+
+def folded(rows: Sequence[Mapping], page: str = "") -> str:
+    """The rows of one computation in HTML: a line that counts them and unfolds to their table.
+
+    Ids lead to `page`, which has the whole ledger, and each row can be led to as `claim-ID`.
+    """
+    if not rows:
+        return ""
+    flipped = any(row["verdict"] != row["expected_verdict"] for row in rows)
+    return details(_tally(rows), table(rows, reasons=False, page=page, anchors=True), flipped)
+
+
+def details(line: str, body: str, unfolded: bool) -> str:
+    """A line of HTML that unfolds to a body."""
+    unfold = " open" * unfolded
+    return f'<details class="rcbook-verdicts"{unfold}><summary>{line}</summary>{body}</details>'
+
+
+def _tally(rows: Sequence[Mapping]) -> str:
+    """`'7 claims: 6 reproduced, 1 not reproduced: eq25.gain'`, with marks."""
+    parts = []
+    for name in (name for name in VERDICTS if any(row["verdict"] == name for row in rows)):
+        ids = [row["id"] for row in rows if row["verdict"] == name]
+        named = ", ".join(f"<code>{html.escape(id)}</code>" for id in ids)
+        mark = f'<span class="rcbook-verdict" data-verdict="{name}">{len(ids)} {name}</span>'
+        parts.append(mark if name == REPRODUCED else f"{mark}: {named}")
+    return f"{len(rows)} claim{'s' * (len(rows) != 1)}: {'; '.join(parts)}"
+
+
+def table(
+    rows: Sequence[Mapping], reasons: bool = True, page: str = "", anchors: bool = False
+) -> str:
     """An HTML table of ledger rows: claim, printed, ours, verdict and, if wanted, the reason.
 
-    Ids are links where `page` says which page has the whole ledger.
+    Ids are links where `page` says which page has the whole ledger; with `anchors` each row can be
+    led to.
     """
     heads = ["Claim", "Printed", "Ours", "Verdict"] + ["Reason"] * reasons
-    head = "".join(f"<th>{h}</th>" for h in heads)
-    body = "".join(_row(row, reasons, page) for row in rows)
+    head = "".join(f'<th role="columnheader" scope="col">{h}</th>' for h in heads)
+    body = "".join(_row(row, heads, page, anchors) for row in rows)
     return (
-        f'<table class="rcbook-ledger"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>'
+        '<table class="rcbook-ledger rcbook-cards" role="table" aria-label="Claims">'
+        f'<thead role="rowgroup"><tr role="row">{head}</tr></thead>'
+        f'<tbody role="rowgroup">{body}</tbody></table>'
     )
 
 
-def _row(row: Mapping, reasons: bool, page: str) -> str:
+def _row(row: Mapping, heads: Sequence[str], page: str, anchors: bool) -> str:
     e = html.escape
-    verdict = e(row["verdict"])
-    if row["verdict"] != row["expected_verdict"]:
-        verdict += f" <b>(expected: {e(row['expected_verdict'])})</b>"
     id = f"<code>{e(row['id'])}</code>"
     if page:
         id = f'<a href="{page}#{e(row["id"])}">{id}</a>'
-    where = f"{e(row['where'])} · {id}"
-    return (
-        f'<tr data-verdict="{e(row["verdict"])}" data-paper="{e(row["paper"])}">'
-        f"<td>{e(row['says'])}<br><small>{where}</small></td>"
-        f"<td>{e(printed(row))}</td><td>{e(value(row['computed']))}</td>"
-        f"<td>{verdict}</td>" + (f"<td>{e(row['reason'])}</td>" * reasons) + "</tr>"
+    claim = f"{math(row['says'])}<br><small>{math(row['where'])} · {id}</small>"
+    cells = (
+        claim,
+        math(printed(row)),
+        e(value(row["computed"])),
+        verdict(row),
+        math(row["reason"]),
     )
+    labelled = zip(heads, cells, strict=False)
+    tds = "".join(f'<td role="cell" data-label="{name}">{cell}</td>' for name, cell in labelled)
+    anchor = f' id="{anchor_of(row["id"])}"' if anchors else ""
+    return (
+        f'<tr role="row"{anchor} data-verdict="{e(row["verdict"])}" '
+        f'data-paper="{e(row["paper"])}">{tds}</tr>'
+    )
+
+
+def anchor_of(id: str) -> str:
+    """Where in its chapter the claim `id` is judged."""
+    return f"claim-{html.escape(id)}"
 
 
 def counts(rows: Iterable[Mapping]) -> str:
