@@ -18,8 +18,8 @@ test: .venv/ready
 # On one thread, as the notebooks run; stored only if every row could be measured.
 bench: .venv/ready
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 .venv/bin/python -m pytest benchmarks \
-	  --benchmark-quiet --benchmark-json=benchmarks/run.json.part
-	mv benchmarks/run.json.part benchmarks/run.json
+	  --benchmark-quiet --benchmark-json=book/cost.json.part
+	mv book/cost.json.part book/cost.json
 
 clean:
 	rm -rf .venv book/_build

@@ -24,26 +24,26 @@ _LEAST = 0.02  # s: a shorter call is repeated until it has taken so long, and d
 class Row:
     """One row: what is measured, against what, and the goal; a test calls one of its verbs once."""
 
-    def __init__(self, benchmark) -> None:
-        self.benchmark = benchmark
+    def __init__(self, benchmark, area: str) -> None:
+        self.benchmark, self.area = benchmark, area
 
     def faster(self, ours: Call, peer: Call, goal: float, rounds: int = 7, **words: str) -> None:
         """How many times longer the peer takes; the goal is a least."""
         times, peers = self._pairs(ours, peer, rounds)
         self._store(peers / times, goal, "at least", "x", **words)
-        self._memory(ours, peer)
+        self._costs(times, ours, peer)
 
     def floors(self, ours: Call, floor: Call, goal: float, rounds: int = 7, **words: str) -> None:
         """How many times longer ours takes than the floor; the goal is a most."""
         times, peers = self._pairs(ours, floor, rounds)
         self._store(times / peers, goal, "at most", " floors", **words)
-        self._memory(ours, floor)
+        self._costs(times, ours, floor)
 
     def seconds(self, ours: Call, goal: float, rounds: int = 3, **words: str) -> None:
         """How long ours takes; the goal is a most."""
         times, _ = self._pairs(ours, lambda: None, rounds)
         self._store(times, goal, "at most", " s", **words)
-        self._memory(ours)
+        self._costs(times, ours)
 
     def growth(
         self,
@@ -61,12 +61,13 @@ class Row:
         wide = scipy.stats.t.ppf(0.975, size.size - 2) * line.stderr
         self.benchmark.pedantic(calls[max(sizes)])
         middle = [line.slope - wide, line.slope, line.slope + wide]
-        self._store(np.array(middle), goal, "at most", "", **words)
+        self._store(np.array(middle), goal, "at most", " exponent", **words)
+        self.benchmark.extra_info["points"] = taken
 
     def value(self, found: float, goal: float, unit: str, **words: str) -> None:
         """A number that was measured otherwise, such as seconds of another process; at most."""
         self.benchmark.pedantic(lambda: None)
-        self._store(np.array([found]), goal, "at most", unit, **words)
+        self._store(np.array([found]), goal, "at most", f" {unit}", **words)
 
     def _pairs(self, ours: Call, peer: Call, rounds: int) -> tuple[np.ndarray, np.ndarray]:
         peers, times = [], []
@@ -83,6 +84,7 @@ class Row:
     ) -> None:
         median = float(np.median(values))
         self.benchmark.extra_info |= {
+            "area": self.area,
             "question": question,
             "against": against,
             "median": median,
@@ -94,8 +96,8 @@ class Row:
             "met": bool(median >= goal if sense == "at least" else median <= goal),
         }
 
-    def _memory(self, ours: Call, peer: Call | None = None) -> None:
-        self.benchmark.extra_info["peak"] = peak(ours)
+    def _costs(self, times: np.ndarray, ours: Call, peer: Call | None = None) -> None:
+        self.benchmark.extra_info |= {"took": float(np.median(times)), "peak": peak(ours)}
         if peer is not None:
             self.benchmark.extra_info["peak_against"] = peak(peer)
 
@@ -126,9 +128,9 @@ def peak(call: Call) -> int:
 
 
 @pytest.fixture
-def row(benchmark) -> Row:
-    """A row of the table."""
-    return Row(benchmark)
+def row(benchmark, request) -> Row:
+    """A row of the table, under the first sentence of its file."""
+    return Row(benchmark, request.module.__doc__.partition("\n")[0].rstrip("."))
 
 
 def pytest_benchmark_update_machine_info(config, machine_info) -> None:
@@ -144,6 +146,8 @@ def pytest_benchmark_update_json(config, benchmarks, output_json) -> None:
     """Which versions were compared, and from which commit; no branch, no author."""
     named = ("numpy", "scipy", "control", "rcbook")
     output_json["versions"] = {name: version(name) for name in named}
+    for bench in output_json["benchmarks"]:  # the ratios say all that is shown
+        bench.pop("options"), bench.pop("stats")
     commit = output_json["commit_info"]
     output_json["commit_info"] = {name: commit.get(name) for name in ("id", "time", "dirty")}
 

@@ -9,6 +9,7 @@ import nbformat
 import pytest
 from conftest import ROOT
 
+from rcbook import ledger
 from rcbook.book import falsify
 
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
@@ -64,6 +65,23 @@ def test_every_picture_has_words(path):
         if re.search(r"\bplt\.subplots\(|\bdraw_\w+\(", cell.source):
             alt = cell.metadata.get("mystnb", {}).get("image", {}).get("alt", "")
             assert len(alt) > 20, f"{cell.id}: {cell.source}"
+
+
+@each
+def test_a_chapter_opens_with_a_picture_and_not_with_set_up(path):
+    first = code_cells(path)[0]
+    assert first.metadata["mystnb"]["image"]["alt"], first.source
+    assert "hide-input" in first.metadata["tags"], first.source
+    assert falsify.SKIP not in first.metadata["tags"], "its imports are needed by all other cells"
+
+
+@pytest.mark.parametrize("key", ledger.papers())
+def test_a_case_study_says_in_a_box_what_it_is_about(key):
+    cells = nbformat.read(ROOT / "notebooks" / ledger.load(key).notebook, as_version=4).cells
+    (box,) = (cell.source for cell in cells[:4] if cell.source.startswith("> "))
+    parts = ["The problem.", "The result.", "What failed.", "The lesson.", "You need"]
+    assert re.findall(r"\*\*(.+?)\*\*", box) == parts
+    assert all(line.startswith(">") for line in box.splitlines())
 
 
 @pytest.mark.parametrize("command", [["check"], ["format", "--check"]], ids=["lint", "format"])

@@ -22,6 +22,7 @@ from rcbook.ledger import show
 from rcbook.ledger.marks import without_marks
 
 LEDGER = "../ledger.html"  # as a chapter sees it
+_WORDS_A_MINUTE = 200  # of a text with formulas
 TAIL = 60  # lines of Sphinx's output shown when it fails
 _JUPYTER_BOOK = "from jupyter_book.cli.main import main; main()"  # it has no __main__
 _OPTIONS = ("-W", "-n", "--keep-going", "-q")
@@ -84,9 +85,10 @@ def cover(
 
 
 def shown(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
-    """A copy of `notebook` for the renderer: no marks of numbers, and ids in its ledgers link to
-    the ledger page."""
+    """A copy of `notebook` for the renderer: no marks of numbers, how long it takes to read, and
+    ids in its ledgers link to the ledger page."""
     notebook = nbformat.from_dict(notebook)
+    notebook.cells[0].source += f"\n\n{reading_time(notebook)}\n"
     for cell in notebook.cells:
         if cell.cell_type == "markdown":
             cell.source = without_marks(cell.source)
@@ -95,6 +97,14 @@ def shown(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
         for output in cell.get("outputs", ()):
             _link(output.get("data", {}))
     return notebook
+
+
+def reading_time(notebook: nbformat.NotebookNode) -> str:
+    """How long the text of a notebook takes to read, and how many pictures it has, in words."""
+    texts = (without_marks(c.source) for c in notebook.cells if c.cell_type == "markdown")
+    minutes = sum(len(text.split()) for text in texts) / _WORDS_A_MINUTE
+    pictures = sum(bool(alternative(cell)) for cell in notebook.cells)
+    return f"*{max(1, round(minutes))} minutes of reading, {pictures} pictures.*"
 
 
 def _link(data: dict) -> None:
