@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -180,7 +181,7 @@ def test_every_link_inside_the_book_leads_somewhere(visit, built):
     html = built / "book" / "_build" / "html"
     links = "links => links.map(link => link.href)"
     targets = set()
-    for page in ("index.html", "ledger.html", "errata.html"):
+    for page in {*pages(built)} - SPHINX_ALONE:
         targets |= set(visit(page).locator("article a[href]").evaluate_all(links))
     for target in targets:
         if target.startswith(html.as_uri()):
@@ -189,6 +190,55 @@ def test_every_link_inside_the_book_leads_somewhere(visit, built):
             assert path.is_file(), target
             if anchor:
                 assert f'id="{anchor}"' in path.read_text(encoding="utf-8"), target
+
+
+def test_a_claim_leads_to_its_cell_and_back(visit, rows, built):
+    """Every row of the ledger has its place in a chapter; one is walked, there and back."""
+    html = built / "book" / "_build" / "html"
+    for row in rows:
+        chapter = html / "notebooks" / f"{row['notebook'].removesuffix('.ipynb')}.html"
+        assert f'id="claim-{row["id"]}"' in chapter.read_text(encoding="utf-8"), row["id"]
+    tab, row = visit("ledger.html"), rows[len(rows) // 2]
+    tab.locator(f"[id='{row['id']}'] a[href*='#claim-']").click()
+    found = tab.locator(f"[id='claim-{row['id']}']")
+    found.wait_for(state="visible")
+    assert found.evaluate("e => e.closest('details').open")
+    found.locator("a[href*='ledger.html#']").click()
+    tab.wait_for_selector(f"table.rcbook-full [id='{row['id']}']")
+
+
+def test_on_a_phone_a_claim_is_a_card_in_a_chapter(visit, rows):
+    tab = visit(f"notebooks/{rows[0]['notebook'].removesuffix('.ipynb')}.html", width=390)
+    folded = tab.locator("details.rcbook-verdicts").first
+    folded.locator("summary").click()
+    for cell in folded.locator("td").all():
+        box = cell.bounding_box()
+        assert box["x"] >= 0 and box["x"] + box["width"] <= 390
+
+
+@pytest.mark.parametrize("width", [1400, 390])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_keeps_a_reader_out(visit, built, scheme, width):
+    """axe-core finds nothing serious or critical on any page."""
+    axe = resources.files("axe_playwright_python").joinpath("axe.min.js").read_text("utf-8")
+    for page in pages(built):
+        tab = visit(page, width=width, scheme=scheme)
+        tab.evaluate(axe)
+        found = tab.evaluate("axe.run({resultTypes: ['violations']})")["violations"]
+        bad = [v for v in found if v["impact"] in ("serious", "critical")]
+        told = [(v["id"], v["nodes"][0]["html"][:200]) for v in bad]
+        assert not told, page
+
+
+def test_no_page_is_heavier_than_three_megabytes(visit, built):
+    """With all pictures, and without what all pages share."""
+    html = built / "book" / "_build" / "html"
+    for page in pages(built):
+        sources = "images => images.map(image => image.src)"
+        images = {*visit(page).locator("img").evaluate_all(sources)}
+        names = [i.removeprefix(html.as_uri() + "/") for i in images if i.startswith("file:")]
+        weight = sum((html / name).stat().st_size for name in [page, *names])
+        assert weight <= 3_000_000, f"{page}: {weight / 1e6:.1f} MB"
 
 
 def test_every_picture_has_words(visit, built):

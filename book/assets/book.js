@@ -1,5 +1,5 @@
-// Filters the table of the ledger page by paper, verdict, role and free text, and unfolds what a link
-// leads to; without this script the page shows every claim.
+// Filters the table of the ledger page by paper, verdict, role and free text, unfolds what a link leads
+// to, and lets the keyboard scroll what is wide; without this script the page shows every claim.
 "use strict";
 
 function filterLedger(form, rows) {
@@ -48,6 +48,17 @@ function unfold() {
   target.scrollIntoView({ block: "center" });
 }
 
+// What scrolls sideways in its own box is reached by Tab and scrolled by the arrows.
+function letScroll() {
+  const wide = ".highlight pre, mjx-container[display], div.math, .output, .rcbook-wide";
+  for (const box of document.querySelectorAll(wide)) {
+    if (box.scrollWidth > box.clientWidth && !box.hasAttribute("tabindex")) box.tabIndex = 0;
+  }
+}
+
 startLedger();
 unfold();
+letScroll();
+if (window.MathJax?.startup?.promise) MathJax.startup.promise.then(letScroll);
+window.addEventListener("resize", letScroll);
 window.addEventListener("hashchange", unfold);
