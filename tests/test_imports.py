@@ -1,6 +1,8 @@
 """Imports run downward only, the mathematics stays free of what draws and runs, nothing is long."""
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ PACKAGE = Path(rcbook.__file__).parent
 FLOOR = {room: i for i, rooms in enumerate(rcbook.FLOORS) for room in rooms}
 MATHEMATICS = {room for room, floor in FLOOR.items() if floor < FLOOR["pictures"]}
 BANNED = {"matplotlib", "pandas", "nbclient", "nbformat", "IPython", "rich", "jupyter_client"}
+DRAWS = {"pictures", "book"}  # the rooms that may wait for what draws and runs
 SHARED = {"memory", "run", "verdict"}  # what all loops have; every other room of theirs is a loop
 MODULES = sorted(PACKAGE.rglob("*.py"))
 LINES, FUNCTION_LINES = 350, 40
@@ -100,6 +103,18 @@ def test_imports_run_downward(path):
 def test_the_mathematics_imports_nothing_that_draws_or_runs(path):
     if room(path) in MATHEMATICS:
         assert not {name.split(".")[0] for name in imported(path)} & BANNED
+
+
+def test_what_is_slow_to_import_is_imported_where_it_is_used():
+    """python-control brings matplotlib and takes a second; a command or a loop must not wait."""
+    paths = [path for path in MODULES if room(path) not in DRAWS]
+    names = [path.relative_to(PACKAGE.parent).with_suffix("").as_posix() for path in paths]
+    modules = [name.replace("/", ".").removesuffix(".__init__") for name in names]
+    code = (
+        f"import sys, {', '.join(modules)}; print(*({{'control', *{BANNED}}} & {{*sys.modules}}))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
 
 
 @each_module

@@ -13,11 +13,15 @@ from oracles.periodic import (
     by_definition,
     closed_form_modes,
     embeddings,
+    held_one_by_one,
+    inverted_one_by_one,
     matrix_by_definition,
+    output_when_late,
     sizes,
     stationary_variance,
     window_of_k,
 )
+from oracles.zdomain import held_in_decimals
 
 from rcbook import zdomain
 from rcbook.loops import periodic
@@ -187,6 +191,41 @@ def test_one_state_serves_all_intervals():
     np.testing.assert_allclose(plant.b[2], plant.a[1] @ plant.b[0] + plant.b[1], atol=1e-12)
 
 
+LAG = control.ss(control.tf([1.0], np.poly([-1.0, -1.0, -1.0])))
+
+
+def test_ten_thousand_different_intervals_are_held_as_one_at_a_time():
+    intervals = BAR.sampling_interval * np.random.default_rng(0).uniform(0.1, 2.0, 10_000)
+    plant = periodic.sample(BAR.plant, intervals)
+    a, b = held_one_by_one(BAR.plant, intervals[::100])
+    # a hundred roundings where the norm of a T is a hundred, of entries up to one
+    np.testing.assert_allclose(plant.a[::100], a, atol=1e-13)
+    np.testing.assert_allclose(plant.b[::100], b, atol=1e-13)
+
+
+def test_equal_intervals_have_equal_plants():
+    """To the last bit: what is at constant intervals is seen to be so."""
+    plant = periodic.sample(BAR.plant, np.tile([250e-6, 260e-6, 250e-6], 200))
+    assert np.all(plant.a[::3] == plant.a[2]) and np.all(plant.b[::3] == plant.b[2])
+
+
+@pytest.mark.parametrize("share", [0.01, 0.3, 1.0])
+@pytest.mark.parametrize("system", [BAR.plant, LAG * 2.0], ids=["bar", "lag"])
+def test_a_late_input_acts_from_when_it_comes(system, share):
+    """Delays of a part of an interval, of several, and of the whole period; intervals unlike."""
+    unit = BAR.sampling_interval if system is BAR.plant else 0.3
+    rng = np.random.default_rng(1)
+    intervals, command = unit * rng.uniform(0.2, 2.0, 11), rng.standard_normal(40)
+    delay = share * intervals.sum()
+    plant = periodic.sample(system, intervals, delay)
+    x, found = np.zeros(plant.order), []
+    for k, v in enumerate(command):
+        found.append(plant.c @ x)
+        x = plant.a[k % 11] @ x + plant.b[k % 11] * v
+    expected = output_when_late(system, intervals, delay, command)
+    np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max())
+
+
 # ---- compensators ----
 
 
@@ -213,6 +252,27 @@ def test_zero_phase_design_makes_every_frozen_plant_real_and_not_negative(gamma)
         np.testing.assert_allclose(gain[k], expected, atol=1e-9)
     late = replace(loop, compensator=replace(loop.compensator, advance=5))
     assert np.abs((1 - periodic.factor(late, z)).imag).max() > 0.5
+
+
+@pytest.mark.parametrize("system", [BAR.plant, LAG], ids=["bar", "lag"])
+def test_zero_phase_taps_are_those_of_one_interval_at_a_time(system):
+    unit = BAR.sampling_interval if system is BAR.plant else 0.3
+    intervals = unit * np.random.default_rng(2).uniform(0.2, 2.0, 10_000)
+    compensator = periodic.zero_phase(system, intervals)
+    expected = inverted_one_by_one(system, intervals[::200])
+    rows = np.abs(expected).max(axis=1, keepdims=True)
+    assert compensator.advance == system.nstates
+    np.testing.assert_allclose(compensator.taps[::200] / rows, expected / rows, atol=1e-12)
+
+
+def test_zero_phase_taps_have_twelve_digits_of_a_computation_in_80():
+    """A fiftieth to eight times the nominal interval; each row to 1e-12 of its largest tap."""
+    intervals = BAR.sampling_interval * np.geomspace(0.02, 8, 7)
+    found = periodic.zero_phase(BAR.plant, intervals).taps
+    for k, interval in enumerate(intervals):
+        _, b, a = held_in_decimals(periodic.balanced(BAR.plant), interval)
+        expected = np.convolve(a, b[:0:-1]) / np.abs(b).sum() ** 2
+        np.testing.assert_allclose(found[k], expected, atol=1e-12 * np.abs(expected).max())
 
 
 def test_scale_of_the_plant_does_not_matter():
@@ -677,6 +737,11 @@ PLANT = LOOP.plant
 REFUSED = [
     ("intervals", lambda: periodic.sample(BAR.plant, [1e-4, -1e-4]), r"-0\.0001 s; they must"),
     ("two inputs", lambda: periodic.sample(control.ss(-1, [[1, 1]], 1, 0), [1.0]), "2 inputs"),
+    ("lasting", lambda: periodic.zero_phase(control.ss(0, 1, 1, 0), [1.0, 2.0]), "1, .*stabilise"),
+    ("growing", lambda: periodic.zero_phase(control.ss(1, 1, 1, 0), [1.0, 2.0]), "2.71.*stabilise"),
+    ("deaf", lambda: periodic.zero_phase(control.ss(-1, 0, 1, 0), [1.0, 2.0]), "plant is zero"),
+    ("no lag", lambda: periodic.zero_phase(control.ss([], [], [], 2), [1.0]), "advance L = 0"),
+    ("stopped", lambda: periodic.zero_phase(BAR.plant, [1e-4, 0.0]), "must be positive"),
     ("direct", lambda: periodic.sample(control.ss(-1, 1, 1, 1), [1.0]), "strictly proper"),
     ("shape of b", lambda: replace(PLANT, b=PLANT.b[1:]), r"b has shape .*fits the others"),
     ("NaN", lambda: replace(PLANT, c=PLANT.c * np.nan), "c holds NaN.*give finite"),

@@ -12,6 +12,7 @@ import scipy.signal
 from oracles.zdomain import (
     exponential_series,
     from_roots,
+    held_in_decimals,
     interval_integrals,
     peak_square,
     two_lags,
@@ -303,6 +304,75 @@ def test_hold_does_not_depend_on_the_unit_of_the_output(scale):
 def test_hold_of_a_static_gain_is_the_gain():
     plant = zdomain.zero_order_hold(control.tf([2.0], [1.0]), 0.1)
     assert plant.delay == 0 and plant.b[0] == 2.0
+
+
+POLES = {
+    "one": [-3.0],
+    "repeated": [-1.0] * 5,
+    "nearly repeated": -1.0 - 1e-7 * np.arange(5),
+    "integrators and a lag": [0.0, 0.0, -2.0],
+    "undamped": [10j, -10j, 100j, -100j],
+    "lightly damped": [-1e-3 + 10j, -1e-3 - 10j, -5.0],
+    "stiff": [0.0, -0.1, -1.0, -1e4],
+    "unstable": [0.5, -1.0, -3.0],
+}
+DURATIONS = [1e-4, 0.01, 0.3, 2.0, 0.3 + 1e-9]
+
+
+def with_poles(name):
+    return control.ss(control.tf([1.0], np.poly(POLES[name]).real))
+
+
+def impulses(matrices, entered, c):
+    """Impulse response 1 .. n at each duration, from what one hold does."""
+    found = []
+    for _ in range(c.size):
+        found.append(entered @ c)
+        entered = np.einsum("kij,kj->ki", matrices, entered)
+    return np.array(found).T
+
+
+@pytest.mark.parametrize("name", POLES)
+def test_held_plants_have_every_digit_of_a_computation_in_80_digits(name):
+    """Impulse responses to 1e-13 of the largest, the first to 1e-13 of itself.  Rounding of one
+    entry of a moves a fast pole, and with it a numerator, by the stiffness: 1e4, hence 1e-12."""
+    system = with_poles(name)
+    matrices, entered = zdomain.hold_matrices(system.A, system.B[:, 0], np.array(DURATIONS))
+    found = impulses(matrices, entered, system.C[0])
+    b, a = zdomain.hold_polynomials(system, np.array(DURATIONS))
+    for k, dt in enumerate(DURATIONS):
+        impulse, zeros, poles = held_in_decimals(system, dt)
+        size = np.abs(impulse).max()
+        np.testing.assert_allclose(found[k], impulse[1:], rtol=0, atol=1e-13 * size)
+        np.testing.assert_allclose(found[k][0], impulse[1], rtol=1e-13)
+        np.testing.assert_allclose(a[k], poles, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(b[k], zeros, rtol=0, atol=1e-12 * np.abs(zeros).max())
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_held_plants_at_ten_thousand_durations_are_those_of_one_at_a_time(seed):
+    system, rng = stable_system(seed), np.random.default_rng(seed)
+    times = np.append(0.0, rng.uniform(0, 3, 9_999) ** 4)  # from nothing to some hundred steps
+    matrices, entered = zdomain.hold_matrices(system.A, system.B[:, 0], times)
+    n = system.nstates
+    joint = np.block([[system.A, system.B], [np.zeros((1, n + 1))]])
+    for k in range(0, times.size, 400):
+        whole = scipy.linalg.expm(joint * times[k])[:n]
+        # both round at each of their steps, some ten of them
+        np.testing.assert_allclose(matrices[k], whole[:, :n], atol=1e-12)
+        np.testing.assert_allclose(entered[k], whole[:, n], atol=1e-12 * np.abs(whole).max())
+    np.testing.assert_array_equal(matrices[0], np.eye(n))
+
+
+def test_hold_does_not_depend_on_the_units_of_the_states():
+    """Powers of ten of 1e9 between neighbours; a Taylor series of the raw matrix has no digits."""
+    system, scale = with_poles("nearly repeated"), 1e9 ** np.arange(5.0)
+    other = control.ss(
+        system.A * scale / scale[:, None], system.B / scale[:, None], system.C * scale, 0
+    )
+    one, two = (zdomain.zero_order_hold(each, 0.3) for each in (system, other))
+    np.testing.assert_allclose(two.b, one.b, rtol=1e-12)
+    np.testing.assert_allclose(two.a, one.a, rtol=1e-12)
 
 
 # ---- plants and polynomials ----

@@ -134,11 +134,11 @@ def _new(arguments: argparse.Namespace) -> int:
 def _ledger(arguments: argparse.Namespace) -> int:
     from rcbook import ledger
     from rcbook.book import last
-    from rcbook.book.project import find
+    from rcbook.book.project import Project, root_of
 
     if not _known(arguments.paper):
         return USAGE
-    project = find(Path.cwd())
+    project = Project(root_of(Path.cwd()), ())  # the rows of the last run say all of the papers
     rows = [row for row in last.read(project) if arguments.paper in (None, row["paper"])]
     if project.stale_mark.exists():
         print("rcbook: the last run failed; this is the ledger of an earlier one", file=sys.stderr)
@@ -153,8 +153,7 @@ def _known(paper: str | None) -> bool:
     """Whether `paper` is the key of a paper, or none was asked for; says so if not."""
     from rcbook import ledger
 
-    known = ledger.papers()
-    if paper in (None, *known):
+    if paper is None or paper in (known := ledger.papers()):
         return True
     print(f"rcbook: no paper {paper!r}; choose one of {', '.join(known)}", file=sys.stderr)
     return False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.signal
+import scipy  # its signal is loaded when asked for, and takes half a second
 from numpy.typing import ArrayLike
 
 from rcbook.signals import signal

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.signal
+import scipy  # its signal is loaded when asked for, and takes half a second
 from numpy.typing import ArrayLike
 
 from rcbook.zdomain import real_number, whole_number

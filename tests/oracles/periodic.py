@@ -150,3 +150,41 @@ def stationary_variance(loop, output, source):
     entry, free, matrix = np.array(entry).T, np.array(free).T, np.array(ends).T
     covariance = scipy.linalg.solve_discrete_lyapunov(matrix, entry @ entry.T)
     return (np.trace(free @ covariance @ free.T) + np.sum(np.square(driven))) / n
+
+
+def held_one_by_one(system, intervals):
+    """a and b of every interval, each by scipy's matrix exponential."""
+    system = periodic.balanced(system)
+    n, joint = system.nstates, np.zeros((system.nstates + 1,) * 2)
+    joint[:n, :n], joint[:n, n] = system.A, system.B[:, 0]
+    whole = np.array([scipy.linalg.expm(joint * t)[:n] for t in intervals])
+    return whole[:, :, :n], whole[:, :, n]
+
+
+def output_when_late(system, intervals, delay, command):
+    """Output at the samples, stepped from each instant at which an input comes to the next."""
+    c, period, at = periodic.balanced(system).C[0], len(intervals), 0.0
+    instants = [0.0]
+    for k in range(len(command)):
+        instants.append(instants[-1] + intervals[k % period])
+    samples, arrivals = np.array(instants[:-1]), np.array(instants[:-1]) + delay
+    x, found = np.zeros(c.size), []
+    for goal in samples:
+        for instant in [*arrivals[(arrivals > at) & (arrivals < goal)], goal]:
+            come = np.flatnonzero(arrivals <= at)
+            (a,), (b,) = held_one_by_one(system, [instant - at])
+            x = a @ x + b * (command[come[-1]] if come.size else 0.0)
+            at = instant
+        found.append(c @ x)
+    return np.array(found)
+
+
+def inverted_one_by_one(system, intervals):
+    """Taps of the zero-phase inverse of each interval: hold, roots and inverse one at a time."""
+    system = periodic.balanced(system)
+    found = []
+    for interval in intervals:
+        plant = zdomain.zero_order_hold(system, interval)
+        each = zdomain.zero_phase_inverse(plant, 1e-9, normalisation="l1")
+        found.append(each.b / each.a[0])
+    return np.array(found)

@@ -83,3 +83,29 @@ def interval_integrals(system, dt, u):
         integrals.append(after[-1] - state[-1])
         state = after
     return integrals
+
+
+def held_in_decimals(system, dt, digits=80):
+    """Impulse response h(0) .. h(n), numerator and denominator behind a zero-order hold: series and
+    doubling of the matrix exponential and the polynomial by Faddeev and Leverrier, in decimals."""
+    n, exact = system.nstates, np.vectorize(lambda x: Decimal(float(x)), otypes=[object])
+    with decimal.localcontext(prec=digits):
+        joint = exact(np.block([[system.A, system.B], [np.zeros((1, n + 1))]])) * Decimal(float(dt))
+        halvings = int(np.abs(joint).sum()).bit_length() + 4
+        term = moved = joint / 2**halvings
+        for k in range(2, 45):
+            term = term @ (joint / 2**halvings) / k
+            moved = moved + term
+        for _ in range(halvings):
+            moved = 2 * moved + moved @ moved
+        a, state, c = moved[:n, :n] + exact(np.eye(n)), moved[:n, n], exact(system.C[0])
+        impulse = [Decimal(system.D.item())]
+        for _ in range(n):
+            impulse.append(c @ state)
+            state = a @ state
+        poles, power = [Decimal(1)], 0 * a
+        for k in range(1, n + 1):
+            power = a @ power + poles[-1] * exact(np.eye(n))
+            poles.append(-np.trace(a @ power) / k)
+        zeros = [sum(poles[i] * impulse[k - i] for i in range(k + 1)) for k in range(n + 1)]
+        return [np.array(each, dtype=float) for each in (impulse, zeros, poles)]

@@ -47,9 +47,15 @@ def find(start: Path) -> Project:
 
     Raises ValueError when there is none.
     """
+    root = root_of(start)
+    return Project(root, tuple(ledger.load(key) for key in ledger.papers()))
+
+
+def root_of(start: Path) -> Path:
+    """The folder of the checkout at or above `start`.  Raises ValueError when there is none."""
     for folder in (start, *start.parents):
         if (folder / "book" / "_config.yml").is_file() and (folder / "notebooks").is_dir():
-            return Project(folder, tuple(ledger.load(key) for key in ledger.papers()))
+            return folder
     raise ValueError(f"no checkout of rcbook at or above {start}; run this inside a clone")
 
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 import scipy.integrate
 from numpy.typing import ArrayLike
 
 from rcbook.zdomain import real_number, whole_number
+
+if TYPE_CHECKING:  # what takes a second to import is imported where it is used
+    import control
 
 _WHOLE = 1e-9  # relative distance from a whole number that counts as one
 
@@ -42,6 +45,8 @@ class BoringBar:
         A compensator that is divided by the size of the numerator takes up any scale, so the
         loop does not change.
         """
+        import control
+
         denominator = np.polymul(
             [1.0, *self.amplifier[::-1]], [self.mass, self.damping, self.stiffness]
         )

@@ -7,12 +7,15 @@ from the velocity error, and the amplifier limits that command to what it can su
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rcbook.zdomain import real_number
+
+if TYPE_CHECKING:  # what takes a second to import is imported where it is used
+    import control
 
 STATES = ("speed", "current", "tachometer", "current_integral", "velocity_integral")
 
@@ -89,7 +92,7 @@ def current_driven(drive: SpindleDrive) -> control.StateSpace:
     b = np.zeros((5, 2))
     b[0, 1] = -1 / d.inertia
     b[[1, 3], 0] = amplified / d.inductance, 1.0
-    return control.ss(a, b, np.eye(5), 0, states=STATES, outputs=STATES, inputs=["command", "load"])
+    return _driven(a, b)
 
 
 def speed_driven(drive: SpindleDrive, torque_slope: float = 0.0) -> control.StateSpace:
@@ -106,6 +109,13 @@ def speed_driven(drive: SpindleDrive, torque_slope: float = 0.0) -> control.Stat
     b = inner.B.copy()
     b[:, 0] = inner.B[:, 0] * drive.velocity_gain
     b[4, 0] = drive.velocity_integral
+    return _driven(a, b)
+
+
+def _driven(a: np.ndarray, b: np.ndarray) -> control.StateSpace:
+    """From command and load to all states."""
+    import control
+
     return control.ss(a, b, np.eye(5), 0, states=STATES, outputs=STATES, inputs=["command", "load"])
 
 
@@ -123,6 +133,8 @@ def in_angle(system: control.StateSpace, speed: float) -> control.StateSpace:
 
     Source: Tsao and Pong (1991), eqs 12 and 15, s = w0 sigma.
     """
+    import control
+
     speed = real_number(speed, "speed", positive=True)
     labels = {"states": system.state_labels, "outputs": system.output_labels}
     return control.ss(

@@ -36,6 +36,8 @@ from rcbook.zdomain.qfilter import (
     zero_phase_gain,
 )
 from rcbook.zdomain.sampling import (
+    hold_matrices,
+    hold_polynomials,
     interval_integral,
     modes,
     phi1,
@@ -54,6 +56,8 @@ __all__ = [
     "boundary",
     "evaluate",
     "first_crossing",
+    "hold_matrices",
+    "hold_polynomials",
     "interval_integral",
     "modes",
     "multiply",

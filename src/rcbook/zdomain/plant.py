@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rcbook.zdomain.checks import polynomial, real_number, whole_number
 from rcbook.zdomain.polynomials import evaluate, shift, sorted_roots
+
+if TYPE_CHECKING:  # what takes a second to import is imported where it is used
+    import control
 
 _ON_CIRCLE = 1e-9  # a pole this close to the unit circle is taken to lie on it
 
@@ -69,6 +72,8 @@ class Plant:
 
     def to_control(self) -> control.TransferFunction:
         """The same plant as a python-control transfer function in z."""
+        import control
+
         length = max(self.numerator.size, self.a.size)
         in_z = [np.pad(p, (0, length - p.size)) for p in (self.numerator, self.a)]
         return control.TransferFunction(*in_z, self.dt)

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-import control
+from typing import TYPE_CHECKING
+
 import numpy as np
+import scipy.linalg
 
 from rcbook.zdomain.checks import real_number
 from rcbook.zdomain.plant import Plant
+
+if TYPE_CHECKING:  # what takes a second to import is imported where it is used
+    import control
+
+_DIGIT = 256  # base in which the steps of a duration are counted, a power of 2
+_BLOCK = 1024  # durations at a time, which stay in the cache
 
 
 def zero_order_hold(system: control.StateSpace | control.TransferFunction, dt: float) -> Plant:
@@ -18,29 +26,107 @@ def zero_order_hold(system: control.StateSpace | control.TransferFunction, dt: f
     outputs, or dt is not positive.
     """
     dt = real_number(dt, "sampling interval dt", positive=True)
+    b, a = hold_polynomials(system, np.array([dt]))
+    delay = int(np.flatnonzero(b[0])[0])
+    return Plant(b[0, delay:], a[0], delay, dt)
+
+
+def hold_polynomials(
+    system: control.StateSpace | control.TransferFunction, intervals: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Numerators and denominators in z^-1 of a plant held over each of the intervals in s.
+
+    Shapes: both (N, n + 1); a numerator begins with as many zeros as the plant has delay.
+    Raises ValueError as `zero_order_hold` does, but for intervals.
+    """
+    system = _single(system)
+    n, c = system.nstates, system.C[0]
+    matrices, state = hold_matrices(system.A, system.B[:, 0], intervals)
+    a = np.zeros((n + 1, intervals.size), dtype=complex)  # a row a power: sums run along rows
+    a[0] = 1
+    for pole in np.linalg.eigvals(system.A):
+        a[1:] -= np.exp(pole * intervals) * a[:-1]
+    impulse = np.full((n + 1, intervals.size), system.D.item())
+    for k in range(n):
+        impulse[k + 1] = state @ c
+        state = (matrices @ state[:, :, None])[:, :, 0]
+    b = np.zeros_like(impulse)
+    for k, coefficient in enumerate(a.real):
+        b[k:] += coefficient * impulse[: n + 1 - k]
+    if not np.all(b.any(axis=0)):
+        raise ValueError("the plant is zero: its output does not answer to its input")
+    return b.T, a.real.T
+
+
+def _single(system: control.StateSpace | control.TransferFunction) -> control.StateSpace:
+    """The plant in continuous state space with one input and one output, or ValueError."""
+    import control
+
     if not system.issiso():
         raise ValueError(f"{system.ninputs} inputs, {system.noutputs} outputs; pick one of each")
     if not system.isctime():
         raise ValueError(f"the plant is sampled at dt = {system.dt!r}; give a continuous one")
-    if isinstance(system, control.TransferFunction):
-        num, den = (np.trim_zeros(p[0][0], "f") for p in (system.num, system.den))
-        if num.size > den.size:
-            raise ValueError(f"numerator degree {num.size - 1} exceeds {den.size - 1}: improper")
-    sampled = control.sample_system(control.ss(system), dt, method="zoh")
-    a = np.atleast_1d(np.poly(sampled.A)) if sampled.nstates else np.ones(1)
-    state, impulse = sampled.B, [sampled.D.item()]
-    for _ in range(sampled.nstates):
-        impulse.append((sampled.C @ state).item())
-        state = sampled.A @ state
-    return _from_impulse(np.array(impulse), a, dt)
+    if not isinstance(system, control.TransferFunction):
+        return system
+    num, den = (np.trim_zeros(p[0][0], "f") for p in (system.num, system.den))
+    if num.size > den.size:
+        raise ValueError(f"numerator degree {num.size - 1} exceeds {den.size - 1}: improper")
+    return control.ss(system)
 
 
-def _from_impulse(impulse: np.ndarray, a: np.ndarray, dt: float) -> Plant:
-    b = np.convolve(a, impulse)[: a.size]
-    if not b.any():
-        raise ValueError("the plant is zero: its output does not answer to its input")
-    delay = int(np.flatnonzero(b)[0])
-    return Plant(b[delay:], a, delay, dt)
+def hold_matrices(a: np.ndarray, b: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """e^(a t), and what an input of one held over t adds to the state, at each time t in s.
+
+    Shapes: a (n, n), b (n,), times (N,) to (N, n, n) and (N, n).  Good for any poles, since a
+    Taylor series needs no eigenvectors.
+    """
+    n = b.size
+    # States scaled by powers of 2 change no digit of a sum: it is enough to know their norm.
+    norm = np.linalg.norm(scipy.linalg.matrix_balance(a, permute=False)[0], 1) if n else 0.0
+    rate = np.ldexp(1.0, np.frexp(norm)[1])
+    steps, moved = times * rate, np.empty((times.size, n, n + 1))
+    with np.errstate(over="ignore", invalid="ignore"):  # multiples that are not needed may overflow
+        series, tables = _series(np.column_stack([a, b]) / rate, steps.max(initial=0.0))
+        for k in range(0, steps.size, _BLOCK):
+            moved[k : k + _BLOCK] = _moved(series, tables, steps[k : k + _BLOCK])
+    moved[:, range(n), range(n)] += 1.0
+    return moved[:, :, :n], moved[:, :, n]
+
+
+def _series(matrix: np.ndarray, longest: float) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Terms of e^matrix - 1, and tables of its multiples for each digit of so many steps.
+
+    Less one, short holds keep their digits.  The matrix is [a b], a of norm 1 or less.
+    """
+    count = 17 + len(matrix)  # entries that begin with a high power keep their digits, too
+    powers, tables = matrix[None], []
+    while len(powers) < count:
+        powers = np.concatenate([powers, powers[-1, :, :-1] @ powers])
+    terms = powers[:count] / np.cumprod(np.arange(1.0, count + 1))[:, None, None]
+    stride = terms.sum(axis=0)
+    while longest >= 1:
+        table = np.array([np.zeros_like(stride), stride])
+        while len(table) < min(_DIGIT, longest + 1):
+            table = np.concatenate([table, _after(table[1:], table[-1])])
+        tables.append(table)
+        stride, longest = table[-1], longest // _DIGIT
+    return terms, tables
+
+
+def _moved(series: np.ndarray, tables: list[np.ndarray], steps: np.ndarray) -> np.ndarray:
+    """By series for the fraction of a step, then by tables for the whole ones, digit by digit."""
+    whole = np.floor(steps)
+    powers = (steps - whole)[:, None] ** np.arange(1, len(series) + 1)
+    moved = np.tensordot(powers, series, axes=1)
+    for table in tables:
+        moved = _after(moved, table[np.fmod(whole, _DIGIT).astype(int)])
+        whole = np.floor(whole / _DIGIT)
+    return moved
+
+
+def _after(first: np.ndarray, then: np.ndarray) -> np.ndarray:
+    """One hold and then another, both less one."""
+    return then[..., :-1] @ first + first + then
 
 
 def interval_integral(system: control.StateSpace, dt: float) -> Plant:

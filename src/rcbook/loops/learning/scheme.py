@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy.signal
+import scipy  # its signal is loaded when asked for, and takes half a second
 
 from rcbook import zdomain
 from rcbook.loops.learning.laws import LearningLaw

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rcbook import zdomain
-from rcbook.loops.periodic.plant import PeriodicPlant, balanced, positive_intervals
+from rcbook.loops.periodic.plant import PeriodicPlant, positive_intervals
 from rcbook.zdomain import inverse
+
+if TYPE_CHECKING:  # what takes a second to import is imported where it is used
+    import control
 
 _ALL_ZEROS = 1e-9  # a radius below which no sampled zero is cancelled
 
@@ -54,19 +57,17 @@ def zero_phase(system: control.StateSpace, intervals: ArrayLike) -> Compensator:
     Source: Hanson and Tsao (2000), eqs 11-13.
     Raises ValueError for intervals that are not positive, and as `zdomain.zero_order_hold` does.
     """
-    scaled = balanced(system)
     distinct, which = np.unique(positive_intervals(intervals), return_inverse=True)
-    inverses = [
-        inverse.zero_phase_inverse(
-            zdomain.zero_order_hold(scaled, interval), _ALL_ZEROS, normalisation="l1"
-        )
-        for interval in distinct
-    ]
-    advances = {each.advance for each in inverses}
-    if len(advances) > 1:
-        raise ValueError(f"L = {sorted(advances)} differs between intervals; choose others")
-    taps = np.array([each.b / each.a[0] for each in inverses])
-    return Compensator(taps[which], advances.pop())
+    # What can be inverted as sampled at the shortest interval can be at all others.
+    shortest = zdomain.zero_order_hold(system, distinct[0])
+    advance = inverse.zero_phase_inverse(shortest, _ALL_ZEROS, normalisation="l1").advance
+    b, a = (rows.T for rows in zdomain.hold_polynomials(system, distinct))
+    b = b[b.any(axis=1).argmax() :]
+    taps = np.zeros((len(a) + len(b) - 1, distinct.size))
+    for k, coefficient in enumerate(a):
+        taps[k : k + len(b)] += coefficient * b[::-1]
+    taps /= np.abs(b).sum(axis=0) ** 2
+    return Compensator(taps.T[which], advance)
 
 
 def least_squares(

@@ -37,7 +37,7 @@ def noise_gain(loop: PeriodicLoop, output: str = "output", source: str = "noise"
     power = _doubled(loop, output, *entered) if power is None else power
     if power is None:
         require_stable(verdict(loop), _MEND)
-        raise ValueError(f"the response to noise does not settle in 2^60 periods; {_MEND}")
+        raise ValueError(f"the response to noise does not settle in 2^40 periods; {_MEND}")
     return float(np.sqrt(power / loop.period))
 
 
@@ -105,7 +105,7 @@ def _doubled(loop: PeriodicLoop, output: str, entry: np.ndarray, seen: np.ndarra
     power, free = timeline[inside.last], _output(inside, timeline, output)
     covariance = _symmetric(entry, entry)
     with np.errstate(over="ignore", invalid="ignore"):
-        for _ in range(60):
+        for _ in range(40):  # what has not faded then lies on the circle but for rounding
             added = _symmetric(power @ covariance, power)
             covariance = covariance + added
             if not np.all(np.isfinite(covariance)):

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike
 
 from rcbook import zdomain
 from rcbook.signals import signal
+
+if TYPE_CHECKING:  # what takes a second to import is imported where it is used
+    import control
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +66,8 @@ def sample(
     Raises ValueError for a plant that is not continuous, has a direct path or several inputs or
     outputs, for intervals that are not positive, and for a delay below 0 or beyond one period.
     """
+    import control
+
     intervals = positive_intervals(intervals)
     if isinstance(system, control.TransferFunction):
         system = control.ss(system)
@@ -74,41 +79,39 @@ def sample(
     if not 0 <= zdomain.real_number(delay, "delay") <= intervals.sum():
         raise ValueError(f"delay = {delay!r} s must lie between 0 and one period")
     scaled = balanced(system)
-    n = scaled.nstates
-    joint = np.zeros((n + 1, n + 1))
-    joint[:n, :n], joint[:n, n] = scaled.A, scaled.B[:, 0]
     if delay:
-        return _sample_late(joint, scaled.C[0], intervals, delay)
+        return _sample_late(scaled, intervals, delay)
     distinct, which = np.unique(intervals, return_inverse=True)
-    held = scipy.linalg.expm(joint * distinct[:, None, None])[which]
-    return PeriodicPlant(held[:, :n, :n], held[:, :n, n], scaled.C[0], intervals)
+    if distinct.size == intervals.size:  # in their own order, and without a copy
+        distinct, which = intervals, slice(None)
+    a, b = zdomain.hold_matrices(scaled.A, scaled.B[:, 0], distinct)
+    return PeriodicPlant(a[which], b[which], scaled.C[0], intervals)
 
 
-def _sample_late(
-    joint: np.ndarray, c: np.ndarray, intervals: np.ndarray, delay: float
-) -> PeriodicPlant:
+def _sample_late(system: control.StateSpace, intervals: np.ndarray, delay: float) -> PeriodicPlant:
     """States [x(k), v(k-1) .. v(k-D)]: within interval k, v(k-j) acts until v(k-j+1) arrives."""
-    n, period = c.size, intervals.size
+    n, period = system.nstates, intervals.size
     arrival, ages = np.full(period, delay), [np.full(period, delay)]
     while arrival.max() > 0:
         arrival = arrival - np.roll(intervals, len(ages))
         ages.append(arrival)
     past = len(ages) - 1
+    first = np.clip(ages, 0, intervals)
+    last = np.vstack([intervals, first[:-1]])
+    j, k = np.nonzero(last > first)
+    durations = [intervals, (last - first)[j, k], (intervals - last)[j, k]]
+    distinct, which = np.unique(np.concatenate(durations), return_inverse=True)
+    moves, inputs = zdomain.hold_matrices(system.A, system.B[:, 0], distinct)
+    whole, acting, rest = np.split(which, [period, period + k.size])
+    acts = (moves[rest] @ inputs[acting, :, None])[:, :, 0]
     a, b = np.zeros((period, n + past, n + past)), np.zeros((period, n + past))
-    a[:, :n, :n] = scipy.linalg.expm(joint * intervals[:, None, None])[:, :n, :n]
+    a[:, :n, :n] = moves[whole]
     a[:, n + 1 :, n:-1] = np.eye(past - 1)
     b[:, n] = 1.0
-    for j, age in enumerate(ages):
-        first = np.clip(age, 0, intervals)
-        last = np.clip(ages[j - 1], 0, intervals) if j else intervals
-        held = scipy.linalg.expm(joint * (last - first)[:, None, None])[:, :n, n]
-        rest = scipy.linalg.expm(joint * (intervals - last)[:, None, None])[:, :n, :n]
-        acts = (rest @ held[:, :, None])[:, :, 0]
-        if j:
-            a[:, :n, n + j - 1] = acts
-        else:
-            b[:, :n] = acts
-    return PeriodicPlant(a, b, np.append(c, np.zeros(past)), intervals)
+    now = j == 0
+    b[k[now], :n] = acts[now]
+    a[k[~now], :n, n + j[~now] - 1] = acts[~now]
+    return PeriodicPlant(a, b, np.append(system.C[0], np.zeros(past)), intervals)
 
 
 def between_samples(
@@ -141,6 +144,8 @@ def between_samples(
 
 def balanced(system: control.StateSpace) -> control.StateSpace:
     """The same plant in states scaled by powers of 2, so that nothing is rounded."""
+    import control
+
     n = system.nstates
     rate = np.abs(np.linalg.eigvals(system.A)).max(initial=0.0) or 1.0
     joint = np.block([[system.A, system.B], [rate * system.C, np.zeros((1, 1))]])

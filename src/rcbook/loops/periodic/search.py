@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-import control
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize_scalar
@@ -13,6 +13,9 @@ from rcbook import zdomain
 from rcbook.loops.memory import gain_bound
 from rcbook.loops.periodic.loop import PeriodicLoop, factor
 from rcbook.loops.periodic.plant import balanced, positive_intervals
+
+if TYPE_CHECKING:  # what takes a second to import is imported where it is used
+    import control
 
 
 def frozen_gain_bound(loop: PeriodicLoop) -> float:
