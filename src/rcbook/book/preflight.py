@@ -9,7 +9,7 @@ from pathlib import Path
 import nbformat
 import yaml
 
-from rcbook.book import numbers
+from rcbook.book import cost, numbers
 from rcbook.book.execute import read
 from rcbook.book.project import Project, read_text
 from rcbook.ledger import Paper
@@ -23,10 +23,11 @@ def problems(project: Project) -> list[str]:
     found = [problem for paper in project.papers for problem in _of_paper(project, paper)]
     found += _contents(project)
     found += _citations(project)
-    try:
-        numbers.of_texts(project)
-    except ValueError as error:
-        found.append(str(error))
+    for ask, of in ((numbers.of_texts, project), (cost.read, project.book)):
+        try:
+            ask(of)
+        except ValueError as error:
+            found.append(str(error))
     return found
 
 

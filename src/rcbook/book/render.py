@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 import shutil
 import subprocess
 import sys
@@ -14,7 +15,7 @@ from pathlib import Path
 import nbformat
 
 from rcbook import ledger
-from rcbook.book import house, pages
+from rcbook.book import cost, house, pages
 from rcbook.book.execute import alternative, plain
 from rcbook.book.project import Project, read_text
 from rcbook.book.run import Run
@@ -22,6 +23,7 @@ from rcbook.ledger import show
 from rcbook.ledger.marks import without_marks
 
 LEDGER = "../ledger.html"  # as a chapter sees it
+_CORNER = re.compile(r"<th[^>]*>(?:&nbsp;)?</th>")
 _WORDS_A_MINUTE = 200  # of a text with formulas
 TAIL = 60  # lines of Sphinx's output shown when it fails
 _JUPYTER_BOOK = "from jupyter_book.cli.main import main; main()"  # it has no __main__
@@ -62,9 +64,10 @@ def fill(stage: Path, project: Project, run: Run) -> None:
     written = {page.name: read_text(page) for page in project.book.glob("*.md")}
     made = pages.pages(project.papers, run.rows)
     made["cover.md"] = pages.cover(name, run.notebooks[name].cells[0].source, alternative(cell))
-    for name, picture in house.pictures().items():
+    measured = cost.read(project.book)
+    for name, picture in (house.pictures() | cost.pictures(measured)).items():
         (stage / name).write_bytes(picture)
-    for name, text in (written | made | house.pages()).items():
+    for name, text in (written | made | house.pages() | cost.pages(measured)).items():
         (stage / name).write_text(without_marks(text), encoding="utf-8")
 
 
@@ -114,6 +117,8 @@ def _link(data: dict) -> None:
         data["text/html"] = ledger.summary(rows, page=LEDGER)
     if rows := data.pop(ledger.SHOWN, None):
         data["text/html"] = show.folded(rows, page=LEDGER)
+    if "text/html" in data:  # the empty corner of a table of pandas heads no column
+        data["text/html"] = _CORNER.sub("<td></td>", data["text/html"])
 
 
 def mathjax() -> Path:
