@@ -4,7 +4,9 @@ Nothing here uses the polynomials or transfer functions of the library, only coe
 """
 
 import numpy as np
+from scipy.signal import lfilter
 
+from rcbook.loops import repetitive
 from rcbook.loops.repetitive import Resonators
 
 SIGNALS = ("output", "command", "repetitive")
@@ -293,3 +295,58 @@ def circulant_solution(loop, r, w):
     )
     right = np.concatenate([b @ w, np.zeros(n), through @ r, r])
     return np.linalg.solve(matrix, right).reshape(4, n)
+
+
+def recursion(loop, r, w, noise, limits, bound=1e30):
+    """The recursions with clipping one sample after the other, until a signal leaves its bound.
+
+    y, v, u up to there, whether it ended early, and how often the limits on v and u acted.
+    """
+    n, c, feedback = loop.process.parts
+    ng, dg, through = loop.parts
+    b, a = loop.process.plant.numerator, loop.process.plant.a
+    lags = max(p.size for p in (ng, dg, through, a, b, n, c)) - 1
+    bound = bound * np.abs([r, w, noise]).max()
+    r, w, noise = np.pad([r, w, noise], ((0, 0), (lags, 0)))
+    y, e, u, v, inner, sent, kept_u, kept_v, acts_v, acts_u = np.zeros((10, r.size))
+    most_u, most_v = limits.repetitive, limits.command
+    terms = {name: np.flatnonzero(p) for name, p in (("ng", ng), ("dg", dg), ("through", through))}
+
+    def recall(p, s, k, first=0, at=None):
+        at = np.arange(p.size) if at is None else at
+        at = at[at >= first]
+        return p[at] @ s[k - at]
+
+    for k in range(lags, r.size):
+        y[k] = recall(b, sent, k) - recall(a, y, k, 1)
+        measured = y[k] + noise[k]
+        e[k] = r[k] - measured
+        asked = recall(ng, e, k, 0, terms["ng"]) + recall(through, r, k, 0, terms["through"])
+        asked = (asked - recall(dg, kept_u, k, 1, terms["dg"])) / dg[0]
+        u[k] = np.clip(asked, -most_u.value, most_u.value)
+        acts_u[k] = abs(asked) > most_u.value
+        kept_u[k] = u[k] if most_u.remember_clipped else asked
+        inner[k] = u[k] - feedback * measured
+        asked = (recall(n, inner, k) - recall(c, kept_v, k, 1)) / c[0]
+        v[k] = np.clip(asked, -most_v.value, most_v.value)
+        acts_v[k] = abs(asked) > most_v.value
+        kept_v[k] = v[k] if most_v.remember_clipped else asked
+        sent[k] = v[k] + w[k]
+        if not max(abs(y[k]), abs(u[k]), abs(v[k])) <= bound:
+            break
+    else:
+        k += 1
+    counts = int(acts_v[lags:k].sum()), int(acts_u[lags:k].sum())
+    return (y[lags:k], v[lags:k], u[lags:k]), k < r.size, counts
+
+
+def filtered(loop, r, w, noise):
+    """y, v, u by filtering through the closed-loop transfers."""
+
+    return [
+        sum(
+            lfilter(*repetitive.transfer(loop, source, output), s)
+            for source, s in zip(("reference", "disturbance", "noise"), (r, w, noise), strict=True)
+        )
+        for output in SIGNALS
+    ]

@@ -19,7 +19,7 @@ from rcbook.loops.repetitive.loop import Loop
 from rcbook.loops.run import Limits
 
 _STRETCH = 512  # samples solved at once at most
-_SHORTEST = 8
+_SHORTEST = 128  # and at least, where guesses go wrong: later ones are put right as well
 Blocks = dict[tuple[int, int], np.ndarray]  # what a row takes of an unknown, as a polynomial
 
 
@@ -94,7 +94,7 @@ def _limited(
         done = (wrong[0] + 1) // 3 if wrong.size else stop - start
         asked[start : start + done], sent[start : start + done] = found[:done], clipped[:done]
         held[start:stop] = acts
-        start, size = start + done, min(system.stretch, max(2 * done, _SHORTEST))
+        start, size = start + done, min(system.stretch, max(4 * done, _SHORTEST))
     return sent, held
 
 
