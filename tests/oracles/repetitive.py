@@ -350,3 +350,62 @@ def filtered(loop, r, w, noise):
         )
         for output in SIGNALS
     ]
+
+
+def stable_factors(d, n, highest):
+    """Intervals of k for which d + k n has all roots inside, by roots of polynomials alone."""
+    d, n = padded(d, n)
+    crossing = np.convolve(d, n[::-1]) - np.convolve(n, d[::-1])
+    crossing[np.abs(crossing) < 1e-18 * np.abs(crossing).max()] = 0
+    z = np.roots(crossing)
+    z = z[np.abs(np.abs(z) - 1) < 1e-4]
+    x = np.append(np.abs(z) / z, [1.0, -1.0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gains = -(np.polyval(d[::-1], x) / np.polyval(n[::-1], x)).real
+    gains = np.unique(gains[np.isfinite(gains) & (gains > 1e-7) & (gains < highest)])
+    edges = np.concatenate([[0.0], gains, [highest]])
+    edges = edges[np.append(True, np.diff(edges) > 1e-9)]
+
+    def stable(gain):
+        return bool(np.all(np.abs(np.roots(np.trim_zeros(d + gain * n, "b"))) < 1 - 1e-9))
+
+    found = []
+    for low, high in zip(edges[:-1], edges[1:], strict=True):
+        if stable((low + high) / 2):
+            if found and found[-1][1] == low and stable(low):
+                low = found.pop()[0]
+            found.append((low, high))
+    return found
+
+
+def lowest_crossing(d, n, points):
+    """The lowest gain at which a root of d + k n reaches the circle, in extended precision.
+
+    A search for real values of -d/n along the circle, by bisection, no derivative used.
+    """
+    one = np.longdouble(1)
+
+    def at(p, angle):
+        lags = np.flatnonzero(p)
+        return (
+            sum(p[i] * np.cos(i * angle) for i in lags),
+            -sum(p[i] * np.sin(i * angle) for i in lags),
+        )
+
+    def ratio(angle):
+        (dr, di), (nr, ni) = at(d, angle), at(n, angle)
+        size = nr * nr + ni * ni
+        return -(dr * nr + di * ni) / size, -(di * nr - dr * ni) / size
+
+    pi = 4 * np.arctan(one)
+    grid = pi * (np.arange(points) + one / 2) / points
+    _, imaginary = ratio(grid)
+    i = np.flatnonzero(np.sign(imaginary[1:]) != np.sign(imaginary[:-1]))
+    low, high = grid[i], grid[i + 1]
+    for _ in range(64):
+        middle = (low + high) / 2
+        same = np.sign(ratio(middle)[1]) == np.sign(ratio(low)[1])
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    ends = [ratio(np.array([end]))[0] for end in (0 * one, pi)]
+    gains = np.concatenate([ratio(low)[0], *ends])
+    return float(gains[gains > 1e-6].min())
