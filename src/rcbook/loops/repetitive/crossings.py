@@ -58,10 +58,10 @@ def crossings(d: np.ndarray, n: np.ndarray, points: int) -> tuple[np.ndarray, np
     On the upper half Im(d conj(n)) changes its sign there; where it only touches zero, none gets
     outside.  At z = 1 and z = -1 the root is a single one.
     """
-    step = np.pi / (points * d.size)
-    at = np.linspace(0, np.pi, points * d.size + 1)
-    at[[0, -1]] = 1e-3 * step, np.pi - 1e-3 * step
-    at, value, touched = _resolved(d, n, at)
+    steps = points * d.size
+    # No point of the grid is a harmonic, where d may be zero and its sign that of rounding.
+    grid = np.concatenate([[1e-3], np.arange(steps) + 0.381966, [steps - 1e-3]])
+    at, value, touched = _resolved(d, n, np.pi / steps * grid)
     sign = np.where(value < 0, -1, 1)
     i = np.flatnonzero(sign[1:] != sign[:-1])
     found = find_root(lambda angle: _imaginary(d, n, angle)[0], (at[i], at[i + 1]))
@@ -80,18 +80,21 @@ def _resolved(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Angles close enough to see every change of sign of Im(d conj(n)), and where it touches 0."""
     value, slope = _imaginary(d, n, at)
-    for _ in range(40):  # where it comes near to zero between two points it may have been beyond
+    for _ in range(40):
+        step, rise = np.diff(at), np.abs(np.diff(value))
         low = np.minimum(np.abs(value[1:]), np.abs(value[:-1]))
-        steep = np.maximum(np.abs(slope[1:]), np.abs(slope[:-1]))
-        toward = (value * slope < 0)[:-1] & (value * slope > 0)[1:] & (value[1:] * value[:-1] > 0)
-        between = np.flatnonzero(toward & (low < steep * np.diff(at)))
+        most = step * np.maximum(np.abs(slope[1:]), np.abs(slope[:-1]))
+        # A minimum between two points may have been beyond zero; a bent change may be three.
+        toward = (value * slope < 0)[:-1] & (value * slope > 0)[1:] & (low < most)
+        changes = value[1:] * value[:-1] <= 0
+        between = np.flatnonzero(np.where(changes, most > 2 * rise, toward))
         if not between.size:
             break
         middle = (at[between] + at[between + 1]) / 2
         at = np.insert(at, between + 1, middle)
         curve = _imaginary(d, n, middle)
         value, slope = np.insert([value, slope], between + 1, curve, axis=1)
-    return at, value, at[between]
+    return at, value, at[between[~changes[between]]]
 
 
 def _imaginary(d: np.ndarray, n: np.ndarray, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
