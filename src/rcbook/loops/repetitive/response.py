@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from rcbook import zdomain
 from rcbook.loops.repetitive import recursion
 from rcbook.loops.repetitive.loop import Loop, Process, as_loop, characteristic_polynomial
-from rcbook.loops.repetitive.stability import require_stable
+from rcbook.loops.repetitive.stability import require_stable, spectral_radius
 from rcbook.loops.run import BOUND, FREE, Limits, Run
 from rcbook.loops.verdict import SOURCES, require_ends
 from rcbook.signals import signal
@@ -168,5 +168,5 @@ def noise_gain(loop: System, output: str = "output", source: str = "noise") -> f
     loop = as_loop(loop)
     require_ends(output, source)
     require_stable(loop)
-    largest = float(np.abs(loop.roots).max(initial=0.0))
+    largest = spectral_radius(loop) ** (1 / (loop.period or 1))
     return zdomain.rms_gain(*transfer(loop, source, output), largest)

@@ -14,6 +14,7 @@ from rcbook.loops import verdict as judging
 from rcbook.loops.memory import RepetitiveController, Resonators
 from rcbook.loops.repetitive.crossings import crossings, outside
 from rcbook.loops.repetitive.loop import Loop, Process, as_loop, characteristic_polynomial
+from rcbook.loops.repetitive.radii import SHORT, spectral_radii
 from rcbook.loops.verdict import MARGIN, Verdict
 from rcbook.zdomain import Plant, multiply
 
@@ -58,6 +59,8 @@ def roots(loop: Loop | Process | Plant) -> np.ndarray:
 def spectral_radius(loop: Loop | Process | Plant) -> float:
     """Largest growth of a mode over one period; over one sample without a controller."""
     loop = as_loop(loop)
+    if loop.repetitive is not None and characteristic_polynomial(loop).size > SHORT:
+        return float(spectral_radii(loop, loop.repetitive.gain))
     largest = np.abs(loop.roots).max(initial=0.0)
     with np.errstate(over="ignore"):
         return float(largest ** (loop.period or 1))
