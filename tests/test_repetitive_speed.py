@@ -2,7 +2,13 @@
 
 import numpy as np
 import pytest
-from oracles.repetitive import filtered, recursion
+from oracles.repetitive import (
+    filtered,
+    lowest_crossing,
+    open_polynomials,
+    recursion,
+    stable_factors,
+)
 
 from rcbook import zdomain
 from rcbook.loops import repetitive
@@ -14,6 +20,7 @@ from rcbook.loops.repetitive import (
     Process,
     RepetitiveController,
     Resonators,
+    radii,
 )
 from rcbook.zdomain import Plant
 
@@ -171,3 +178,112 @@ def test_a_limit_that_clips_everything():
     slow, _, counts = recursion(loop, r, w, noise, limits)
     assert (run.command_clipped, run.repetitive_clipped) == counts and min(counts) > 700
     agree(run, slow, 1e-12)
+
+
+# ---- stability ----
+
+
+def judged_loop(seed):
+    """A loop on a plant of up to four poles, every second one not the one it was designed on."""
+    rng = np.random.default_rng(seed)
+    poles = rng.uniform(-0.85, 0.95, int(rng.integers(1, 5)))
+    zeros = rng.choice([-2.0, -1.0, -0.5, 0.3, 0.7, 1.6], int(rng.integers(0, 4)), replace=False)
+    b = rng.uniform(0.5, 2) * np.atleast_1d(np.poly(zeros))
+    plant = Plant(b, np.poly(poles), int(rng.integers(1, 4)), 1.0)
+    n, q = int(rng.integers(20, 90)), zdomain.binomial_q(int(rng.integers(0, 3)))
+    memory = (
+        repetitive.plain(n, q),
+        repetitive.plain(n + 0.37, q),
+        repetitive.odd_harmonic(2 * n, q),
+        repetitive.several(repetitive.plain(n, q), repetitive.plain(n + 9, [0.3, 0.4, 0.3])),
+    )[seed % 4]
+    loop = repetitive.design(plant, memory, 0.5, form=FORMS[seed % 2])
+    if seed % 8 < 4:
+        return loop
+    other = Plant(rng.uniform(0.4, 1.6) * b, np.poly(0.95 * poles), plant.delay + seed % 2, 1.0)
+    return Loop(Process(other), loop.repetitive, loop.form)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_stable_gains_are_those_from_all_roots(seed):
+    loop = judged_loop(seed)
+    found, truth = repetitive.stable_gains(loop), stable_factors(*open_polynomials(loop), 100.0)
+    # companion matrices of up to 400 coefficients; 1e-4 from the circle taken to be on it
+    np.testing.assert_allclose(np.ravel(found), np.ravel(truth), rtol=1e-8, atol=1e-8)
+
+
+def test_a_crossing_next_to_a_harmonic_of_second_order_is_found():
+    """Where d is zero twice, three zeros of Im(d conj(n)) lie within a step of the grid."""
+    twice = repetitive.several(repetitive.plain(39), repetitive.plain(39))
+    loop = repetitive.design(Plant([0.83], [1, 0.45], 3, 1.0), twice, 0.5)
+    other = Plant([0.83253556], [1, 0.48866565], 3, 1.0)
+    loop = Loop(other, loop.repetitive)
+    ((low, high),) = repetitive.stable_gains(loop)
+    for edge, inside in ((low, 1.01 * low), (high, 0.99 * high)):
+        radius = np.abs(loop.with_gain(edge).roots).max()
+        assert radius == pytest.approx(1, abs=1e-10)
+        assert np.abs(loop.with_gain(inside).roots).max() < 1 - 1e-11
+    assert np.abs(loop.with_gain(0.99 * low).roots).max() > 1
+
+
+@pytest.mark.parametrize("order", [1, 5])
+@pytest.mark.parametrize("period", [300, 1200])
+def test_the_limit_at_a_long_period_is_right_to_1e_8(period, order):
+    """Against a search in extended precision; most of the error left is that of the limit."""
+    process = random_process(np.random.default_rng(3), order, False)
+    loop = repetitive.design(process, repetitive.plain(period, zdomain.binomial_q(1)), 0.5)
+    ((low, high),) = repetitive.stable_gains(loop)
+    truth = lowest_crossing(*open_polynomials(loop), 16 * period)
+    assert low == 0 and high == pytest.approx(truth, rel=1e-12)
+
+
+def test_the_limit_of_a_period_of_ten_thousand_has_a_closed_form():
+    """Exact cancellation: z^N = 1 - k."""
+    loop = repetitive.design(Plant([0.4, 0.2], [1, -1.2, 0.5], 1, 1.0), 10_000, 0.5)
+    ((low, high),) = repetitive.stable_gains(loop)
+    assert low == 0 and high == pytest.approx(2, rel=1e-8)
+    np.testing.assert_allclose(repetitive.spectral_radii(loop, [0.3, 1.9]), [0.7, 0.9], rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_spectral_radii_are_those_of_all_roots(seed):
+    loop = judged_loop(seed)
+    gains = np.r_[np.random.default_rng(seed).uniform(0.02, 4, 4), 1.02]
+    found = repetitive.spectral_radii(loop, gains)
+    truth = np.array([np.abs(loop.with_gain(k).roots).max() for k in gains])
+    # a double root of the plant, or of two memories, is known to the root of rounding only
+    tolerance = 1e-10 if seed % 4 < 3 else 1e-7
+    np.testing.assert_allclose(found ** (1 / loop.period), truth, rtol=tolerance)
+
+
+def test_spectral_radii_have_the_shape_of_the_gains():
+    loop = judged_loop(0)
+    found = repetitive.spectral_radii(loop, [[0.3, 0.9, 1.4]] * 2)
+    assert found.shape == (2, 3)
+    for row in found:
+        for radius, gain in zip(row, (0.3, 0.9, 1.4), strict=True):
+            alone = repetitive.spectral_radius(loop.with_gain(gain))
+            assert radius == pytest.approx(alone, rel=1e-10)
+            assert repetitive.spectral_radii(loop, gain) == pytest.approx(alone, rel=1e-10)
+    with pytest.raises(ValueError, match="gains hold -1; give positive"):
+        repetitive.spectral_radii(loop, [0.5, -1.0])
+    with pytest.raises(ValueError, match="no repetitive controller"):
+        repetitive.spectral_radii(Loop(loop.process), [0.5])
+
+
+@pytest.mark.parametrize("missing", ["outermost", "twice"])
+def test_a_root_that_is_not_found_is_missed(monkeypatch, missing):
+    """A mutant: candidates without the outermost, or with another in its place."""
+    loop, gains = judged_loop(4), np.array([0.3, 1.3, 2.5])
+    assert loop.process.plant.a.size + loop.period > radii.SHORT
+    truth = repetitive.spectral_radii(loop, gains)
+    whole = radii._candidates
+
+    def wrong(*args):
+        roots = whole(*args)
+        last = np.arange(gains.size), np.nanargmax(roots.real, axis=1)
+        roots[last] = np.nan if missing == "outermost" else roots[last] - 0.5
+        return roots
+
+    monkeypatch.setattr(radii, "_candidates", wrong)
+    np.testing.assert_allclose(repetitive.spectral_radii(loop, gains), truth, rtol=1e-9)

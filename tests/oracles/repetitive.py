@@ -3,6 +3,8 @@
 Nothing here uses the polynomials or transfer functions of the library, only coefficients.
 """
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.signal import lfilter
 
@@ -370,7 +372,7 @@ def stable_factors(d, n, highest):
         return bool(np.all(np.abs(np.roots(np.trim_zeros(d + gain * n, "b"))) < 1 - 1e-9))
 
     found = []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         if stable((low + high) / 2):
             if found and found[-1][1] == low and stable(low):
                 low = found.pop()[0]

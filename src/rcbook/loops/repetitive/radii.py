@@ -17,10 +17,10 @@ from rcbook.loops.memory import RepetitiveController
 from rcbook.loops.repetitive.crossings import crossings, outside
 from rcbook.loops.repetitive.loop import Loop
 from rcbook.signals import signal
-from rcbook.zdomain import evaluate, multiply
+from rcbook.zdomain import evaluate, multiply, sorted_roots
 
 SHORT = 60  # coefficients: all roots of as many are as quick
-_TOGETHER = 4096
+_TOGETHER = 4096  # roots: what they need stays in the cache
 
 
 def spectral_radii(loop: Loop, gains: ArrayLike) -> np.ndarray:
@@ -33,26 +33,16 @@ def spectral_radii(loop: Loop, gains: ArrayLike) -> np.ndarray:
     if not np.all(gains > 0):
         raise ValueError(f"gains hold {gains.min():g}; give positive ones")
     d, n = loop.with_gain(1.0).open_polynomials
-    radii = np.full(gains.size, np.nan)
-    if isinstance(controller, RepetitiveController) and max(d.size, n.size) > SHORT:
-        radii = _certain(d, n, gains, _candidates(loop, gains))
-    left = np.isnan(radii)
-    radii[left] = _from_all_roots(d, n, gains[left])
-    with np.errstate(over="ignore"):
-        return (radii**loop.period).reshape(shape)
-
-
-def _from_all_roots(d: np.ndarray, n: np.ndarray, gains: np.ndarray) -> np.ndarray:
     length = max(d.size, n.size)
     d, n = (np.pad(p, (0, length - p.size)) for p in (d, n))
-    radii = np.zeros(gains.size)
-    size = max(1, 100_000 // length**2)
-    for i in range(0, gains.size, size):
-        p = d + gains[i : i + size, None] * n
-        companion = np.tile(np.eye(length - 1, k=-1), (p.shape[0], 1, 1))
-        companion[:, 0] = -p[:, 1:] / p[:, :1]
-        radii[i : i + size] = np.abs(np.linalg.eigvals(companion)).max(axis=1, initial=0.0)
-    return radii
+    radii = np.full(gains.size, np.nan)
+    one = isinstance(controller, RepetitiveController)
+    if one and length > SHORT and controller.memory.taps.size < controller.memory.first:
+        radii = _certain(d, n, gains, _candidates(loop, gains))
+    for i in np.flatnonzero(np.isnan(radii)):
+        radii[i] = np.abs(sorted_roots(d + gains[i] * n)).max(initial=0.0)
+    with np.errstate(over="ignore"):
+        return (radii**loop.period).reshape(shape)
 
 
 def _candidates(loop: Loop, gains: np.ndarray) -> np.ndarray:
@@ -62,17 +52,19 @@ def _candidates(loop: Loop, gains: np.ndarray) -> np.ndarray:
     a, b = multiply(path.a, comp.a), multiply(path.numerator, comp.b)
     # As z goes round the upper half, the other factors turn by no more than so many halves.
     extra = (a.size + b.size + memory.taps.size) // 2
-    at = 2j * np.pi / memory.first * np.arange(-extra, memory.first // 2 + extra + 1)
+    turns = 2j * np.pi * np.arange(-extra, memory.first // 2 + extra + 1)
+    at = (turns + 1e-3) / memory.first  # beside the circle, where a pole may be
     taps = evaluate(memory.taps, np.exp(at))
     compensated = np.exp(comp.advance * at) * evaluate(b, np.exp(at)) / evaluate(a, np.exp(at))
-    poles = np.roots(a)
-    poles = poles[np.abs(evaluate(b, poles)) < 1e-12 * np.abs(b).sum() * np.abs(poles) ** -b.size]
+    poles = np.roots(np.trim_zeros(a, "b"))
+    scale = evaluate(np.abs(b), np.abs(poles))
+    poles = poles[np.abs(evaluate(b, poles)) < 1e-12 * scale]
     cancelled = np.log(poles[poles.imag >= 0].astype(complex))
     found = []
     for k in np.array_split(gains[:, None], -(-gains.size * at.size // _TOGETHER)):
         around = taps * (1 - k * compensated)
-        start = np.log(np.abs(around)) + 1j * np.unwrap(np.angle(around))
-        start = at + start / memory.first
+        start = np.log(np.maximum(np.abs(around), 1e-300)) + 1j * np.unwrap(np.angle(around))
+        start = (turns + start) / memory.first
         upper = np.abs(start.imag - np.pi / 2) < np.pi / 2 + 6 / memory.first
         roots = np.full(start.shape, complex(np.nan, np.nan))
         each = np.broadcast_to(k, start.shape)[upper]
@@ -87,7 +79,7 @@ def _newton(
 ) -> np.ndarray:
     """Roots z = e^s of a = z^-first taps (a - k z^advance b), NaN where there is none near."""
     with np.errstate(all="ignore"):
-        for _ in range(5):
+        for _ in range(4):
             (a, b, taps), slopes = zip(*(_along(p, np.exp(-s)) for p in polynomials), strict=True)
             ahead = k * np.exp(advance * s)
             rest = a - ahead * b
@@ -122,12 +114,12 @@ def _certain(d: np.ndarray, n: np.ndarray, gains: np.ndarray, roots: np.ndarray)
     size = np.fmax.reduce(roots.real, axis=1, initial=-np.inf)
     weight = np.where((roots.imag < 1e-9) | (roots.imag > np.pi - 1e-9), 1, 2)
     radii = np.full(gains.size, np.nan)
-    for groups in (1, 4, 16):
+    for groups in (1, 8)[: gains.size]:
         left = np.flatnonzero(np.isnan(radii) & np.isfinite(size))
         if not left.size:
             break
         for some in np.array_split(left[np.argsort(size[left])], min(groups, left.size)):
-            level = size[some[0]] - 1e-4 / max(d.size, n.size)
+            level = size[some[0]] - 1e-4 / d.size
             found = np.sum(weight[some] * (roots[some].real > level), axis=1)
             right = some[found == _outside(d, n, level, gains[some])]
             radii[right] = np.exp(size[right])
@@ -135,16 +127,16 @@ def _certain(d: np.ndarray, n: np.ndarray, gains: np.ndarray, roots: np.ndarray)
 
 
 def _outside(d: np.ndarray, n: np.ndarray, level: float, gains: np.ndarray) -> np.ndarray:
-    """How many roots lie outside of the circle of radius e^level, at each gain."""
-    length = max(d.size, n.size)
-    d, n = (np.pad(p, (0, length - p.size)) * np.exp(-level * np.arange(length)) for p in (d, n))
+    """How many roots lie outside of the circle of radius e^level at each gain; -1 if on it."""
+    powers = np.arange(d.size) - (d.size if level < 0 else 0)  # so none overflows
+    d, n = (p * np.exp(-level * powers) for p in (d, n))
     edges, more = crossings(d, n, 8)
     ends = np.concatenate([[0.0], edges[(edges > 0) & (edges < gains.max())], [2 * gains.max()]])
     widest = np.argmax(np.diff(ends))
     known = ends[widest : widest + 2].mean()
     total = np.append(0, np.cumsum(more))
-    return (
-        total[np.searchsorted(edges, gains)]
-        - total[np.searchsorted(edges, known)]
-        + outside(d + known * n, 1.0)
-    )
+    try:
+        total += outside(d + known * n, 1.0) - total[np.searchsorted(edges, known)]
+    except ZeroDivisionError:
+        return np.full(gains.size, -1)
+    return total[np.searchsorted(edges, gains)]

@@ -113,9 +113,10 @@ def _solve(system: _System, right: np.ndarray, held: np.ndarray | None = None) -
         return dtbsv(reach, band.T, right, lower=1, diag=1, overwrite_x=1).reshape(-1, 3)
     limited, at = system.limited[: right.size], np.flatnonzero(held)
     right -= dtbmv(reach, limited.T, held.reshape(-1), lower=1)
-    band[at] -= limited[at]
+    whole = band[at]
+    band[at] = whole - limited[at]
     found = dtbsv(reach, band.T, right, lower=1, diag=1, overwrite_x=1)
-    band[at] += limited[at]
+    band[at] = whole
     return found.reshape(-1, 3)
 
 
