@@ -114,7 +114,7 @@ def _certain(d: np.ndarray, n: np.ndarray, gains: np.ndarray, roots: np.ndarray)
     size = np.fmax.reduce(roots.real, axis=1, initial=-np.inf)
     weight = np.where((roots.imag < 1e-9) | (roots.imag > np.pi - 1e-9), 1, 2)
     radii = np.full(gains.size, np.nan)
-    for groups in (1, 8)[: gains.size]:
+    for groups in (1, 3, 9)[: gains.size]:
         left = np.flatnonzero(np.isnan(radii) & np.isfinite(size))
         if not left.size:
             break
