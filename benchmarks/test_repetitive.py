@@ -91,7 +91,10 @@ def test_run_with_limits(row, order, period):
 
 @pytest.mark.parametrize("period", PERIODS)
 def test_linear_response(row, period):
-    loop, (r, _) = replace(loop_of(6, period), form="cascade"), signals(period, 2400)
+    loop, (r, _) = (
+        replace(loop_of(6, period), form="cascade"),
+        signals(period, 2400 if period == 1200 else 10_000),
+    )
     system, t = connected(loop), loop.dt * np.arange(r.size)
     theirs = control.forced_response(system, t[:600], r[:600]).outputs
     assert np.allclose(repetitive.respond(loop, r).output[:600], theirs, rtol=0, atol=1e-8)
