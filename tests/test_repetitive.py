@@ -847,7 +847,9 @@ def test_a_run_ends_where_a_signal_leaves_its_bound(answer):
     # 1.4 a period and no more than a few times that in a sample
     assert bound / 20 < largest <= bound
     short = answer(loop, r[:n], disturbance=w[:n], noise=noise[:n])
-    assert not short.unbounded and np.array_equal(short.output, run.output)
+    assert not short.unbounded
+    # where a stretch ends, BLAS adds in another order
+    np.testing.assert_allclose(short.output, run.output, rtol=1e-12)
 
 
 def test_a_refusal_is_quick_and_names_gain_and_mend():

@@ -3,8 +3,12 @@
 Nothing here uses the polynomials or transfer functions of the library, only coefficients.
 """
 
-import numpy as np
+from itertools import pairwise
 
+import numpy as np
+from scipy.signal import lfilter
+
+from rcbook.loops import repetitive
 from rcbook.loops.repetitive import Resonators
 
 SIGNALS = ("output", "command", "repetitive")
@@ -293,3 +297,117 @@ def circulant_solution(loop, r, w):
     )
     right = np.concatenate([b @ w, np.zeros(n), through @ r, r])
     return np.linalg.solve(matrix, right).reshape(4, n)
+
+
+def recursion(loop, r, w, noise, limits, bound=1e30):
+    """The recursions with clipping one sample after the other, until a signal leaves its bound.
+
+    y, v, u up to there, whether it ended early, and how often the limits on v and u acted.
+    """
+    n, c, feedback = loop.process.parts
+    ng, dg, through = loop.parts
+    b, a = loop.process.plant.numerator, loop.process.plant.a
+    lags = max(p.size for p in (ng, dg, through, a, b, n, c)) - 1
+    bound = bound * np.abs([r, w, noise]).max()
+    r, w, noise = np.pad([r, w, noise], ((0, 0), (lags, 0)))
+    y, e, u, v, inner, sent, kept_u, kept_v, acts_v, acts_u = np.zeros((10, r.size))
+    most_u, most_v = limits.repetitive, limits.command
+    terms = {name: np.flatnonzero(p) for name, p in (("ng", ng), ("dg", dg), ("through", through))}
+
+    def recall(p, s, k, first=0, at=None):
+        at = np.arange(p.size) if at is None else at
+        at = at[at >= first]
+        return p[at] @ s[k - at]
+
+    for k in range(lags, r.size):
+        y[k] = recall(b, sent, k) - recall(a, y, k, 1)
+        measured = y[k] + noise[k]
+        e[k] = r[k] - measured
+        asked = recall(ng, e, k, 0, terms["ng"]) + recall(through, r, k, 0, terms["through"])
+        asked = (asked - recall(dg, kept_u, k, 1, terms["dg"])) / dg[0]
+        u[k] = np.clip(asked, -most_u.value, most_u.value)
+        acts_u[k] = abs(asked) > most_u.value
+        kept_u[k] = u[k] if most_u.remember_clipped else asked
+        inner[k] = u[k] - feedback * measured
+        asked = (recall(n, inner, k) - recall(c, kept_v, k, 1)) / c[0]
+        v[k] = np.clip(asked, -most_v.value, most_v.value)
+        acts_v[k] = abs(asked) > most_v.value
+        kept_v[k] = v[k] if most_v.remember_clipped else asked
+        sent[k] = v[k] + w[k]
+        if not max(abs(y[k]), abs(u[k]), abs(v[k])) <= bound:
+            break
+    else:
+        k += 1
+    counts = int(acts_v[lags:k].sum()), int(acts_u[lags:k].sum())
+    return (y[lags:k], v[lags:k], u[lags:k]), k < r.size, counts
+
+
+def filtered(loop, r, w, noise):
+    """y, v, u by filtering through the closed-loop transfers."""
+
+    return [
+        sum(
+            lfilter(*repetitive.transfer(loop, source, output), s)
+            for source, s in zip(("reference", "disturbance", "noise"), (r, w, noise), strict=True)
+        )
+        for output in SIGNALS
+    ]
+
+
+def stable_factors(d, n, highest):
+    """Intervals of k for which d + k n has all roots inside, by roots of polynomials alone."""
+    d, n = padded(d, n)
+    crossing = np.convolve(d, n[::-1]) - np.convolve(n, d[::-1])
+    crossing[np.abs(crossing) < 1e-18 * np.abs(crossing).max()] = 0
+    z = np.roots(crossing)
+    z = z[np.abs(np.abs(z) - 1) < 1e-4]
+    x = np.append(np.abs(z) / z, [1.0, -1.0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        gains = -(np.polyval(d[::-1], x) / np.polyval(n[::-1], x)).real
+    gains = np.unique(gains[np.isfinite(gains) & (gains > 1e-7) & (gains < highest)])
+    edges = np.concatenate([[0.0], gains, [highest]])
+    edges = edges[np.append(True, np.diff(edges) > 1e-9)]
+
+    def stable(gain):
+        return bool(np.all(np.abs(np.roots(np.trim_zeros(d + gain * n, "b"))) < 1 - 1e-9))
+
+    found = []
+    for low, high in pairwise(edges):
+        if stable((low + high) / 2):
+            if found and found[-1][1] == low and stable(low):
+                low = found.pop()[0]
+            found.append((low, high))
+    return found
+
+
+def lowest_crossing(d, n, points):
+    """The lowest gain at which a root of d + k n reaches the circle, in extended precision.
+
+    A search for real values of -d/n along the circle, by bisection, no derivative used.
+    """
+    one = np.longdouble(1)
+
+    def at(p, angle):
+        lags = np.flatnonzero(p)
+        return (
+            sum(p[i] * np.cos(i * angle) for i in lags),
+            -sum(p[i] * np.sin(i * angle) for i in lags),
+        )
+
+    def ratio(angle):
+        (dr, di), (nr, ni) = at(d, angle), at(n, angle)
+        size = nr * nr + ni * ni
+        return -(dr * nr + di * ni) / size, -(di * nr - dr * ni) / size
+
+    pi = 4 * np.arctan(one)
+    grid = pi * (np.arange(points) + one / 2) / points
+    _, imaginary = ratio(grid)
+    i = np.flatnonzero(np.sign(imaginary[1:]) != np.sign(imaginary[:-1]))
+    low, high = grid[i], grid[i + 1]
+    for _ in range(64):
+        middle = (low + high) / 2
+        same = np.sign(ratio(middle)[1]) == np.sign(ratio(low)[1])
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    ends = [ratio(np.array([end]))[0] for end in (0 * one, pi)]
+    gains = np.concatenate([ratio(low)[0], *ends])
+    return float(gains[gains > 1e-6].min())

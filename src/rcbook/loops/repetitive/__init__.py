@@ -24,6 +24,7 @@ from rcbook.loops.repetitive.loop import (
     design,
     pi_controller,
 )
+from rcbook.loops.repetitive.radii import spectral_radii
 from rcbook.loops.repetitive.response import (
     frequency_response,
     noise_gain,

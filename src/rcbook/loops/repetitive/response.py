@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import scipy.signal
 from numpy.typing import ArrayLike
 
 from rcbook import zdomain
+from rcbook.loops.repetitive import recursion
 from rcbook.loops.repetitive.loop import Loop, Process, as_loop, characteristic_polynomial
-from rcbook.loops.repetitive.stability import require_stable
+from rcbook.loops.repetitive.stability import require_stable, spectral_radius
 from rcbook.loops.run import BOUND, FREE, Limits, Run
 from rcbook.loops.verdict import SOURCES, require_ends
 from rcbook.signals import signal
@@ -68,37 +68,7 @@ def simulate(
     Raises ValueError when the signals differ in length or hold NaN.
     """
     loop, inputs = as_loop(loop), _inputs(reference, disturbance, noise)
-    n, c, feedback = loop.process.parts
-    ng, dg, through = loop.parts
-    b, a = loop.process.plant.numerator, loop.process.plant.a
-    lags = max(p.size for p in (ng, dg, through, a, b, n, c)) - 1
-    r, w, noise = np.pad(inputs, ((0, 0), (lags, 0)))
-    y, e, u, v, inner, sent, kept_u, kept_v, asked_u, asked_v = np.zeros((10, r.size))
-    bound = _bound(inputs)
-
-    for k in range(lags, r.size):
-        y[k] = _recall(b, sent, k) - _recall(a, y, k, 1)
-        measured = y[k] + noise[k]
-        e[k] = r[k] - measured
-        asked = _recall(ng, e, k) + _recall(through, r, k) - _recall(dg, kept_u, k, 1)
-        asked_u[k] = asked / dg[0]
-        u[k] = np.clip(asked_u[k], -limits.repetitive.value, limits.repetitive.value)
-        inner[k] = u[k] - feedback * measured
-        asked_v[k] = (_recall(n, inner, k) - _recall(c, kept_v, k, 1)) / c[0]
-        v[k] = np.clip(asked_v[k], -limits.command.value, limits.command.value)
-        kept_u[k] = u[k] if limits.repetitive.remember_clipped else asked_u[k]
-        kept_v[k] = v[k] if limits.command.remember_clipped else asked_v[k]
-        sent[k] = v[k] + w[k]
-        if not max(abs(y[k]), abs(u[k]), abs(v[k])) <= bound:
-            break
-    asked = ((asked_v, limits.command.value), (asked_u, limits.repetitive.value))
-    acted = (np.abs(s[lags:]) > most for s, most in asked)
-    return _run(loop, inputs, (y[lags:], v[lags:], u[lags:]), *acted)
-
-
-def _recall(p: np.ndarray, s: np.ndarray, k: int, first: int = 0) -> float:
-    """p(z^-1) s at sample k, without the `first` powers."""
-    return p[first:] @ s[k - p.size + 1 : k - first + 1][::-1]
+    return _run(loop, inputs, *recursion.signals(loop, inputs, limits, _bound(inputs)))
 
 
 def respond(
@@ -108,16 +78,8 @@ def respond(
     disturbance: ArrayLike | None = None,
     noise: ArrayLike | None = None,
 ) -> Run:
-    """The same run as `simulate` without limits, by filtering through the closed-loop transfers."""
-    loop, inputs = as_loop(loop), _inputs(reference, disturbance, noise)
-    found = [
-        sum(
-            scipy.signal.lfilter(*transfer(loop, source, output), s)
-            for source, s in zip(SOURCES, inputs, strict=True)
-        )
-        for output in _SOLVED
-    ]
-    return _run(loop, inputs, found)
+    """The same run as `simulate` without limits."""
+    return simulate(loop, reference, disturbance=disturbance, noise=noise)
 
 
 def _inputs(
@@ -133,22 +95,22 @@ def _inputs(
 
 
 def _bound(inputs: Sequence[np.ndarray]) -> float:
-    return BOUND * float(np.abs(inputs).max())
+    return BOUND * max(map(_largest, inputs))
 
 
-def _run(
-    loop: Loop,
-    inputs: Sequence[np.ndarray],
-    found: Sequence[np.ndarray],
-    clipped_v: np.ndarray | None = None,
-    clipped_u: np.ndarray | None = None,
-) -> Run:
+def _largest(s: np.ndarray) -> float:
+    return float(max(s.max(), -s.min()))
+
+
+def _run(loop: Loop, inputs: Sequence[np.ndarray], found: np.ndarray, held: np.ndarray) -> Run:
     """The record up to where a signal exceeds the bound."""
-    within = np.abs(found).max(axis=0) <= _bound(inputs)
-    n = within.size if within.all() else int(np.argmin(within))
-    acted = [0 if s is None else int(np.sum(s[:n])) for s in (clipped_v, clipped_u)]
-    signals = (s[:n] for s in (*inputs, *found))
-    return Run(loop.dt * np.arange(n), *signals, n < within.size, *acted)
+    bound, n = _bound(inputs), found.shape[1]
+    if not max(map(_largest, found)) <= bound:
+        n = int(np.argmin(np.abs(found).max(axis=0) <= bound))
+    y, u, v = found[:, :n]
+    _, clipped_u, clipped_v = np.count_nonzero(held[:, :n], axis=1).tolist()
+    time, unbounded = loop.dt * np.arange(n), n < found.shape[1]
+    return Run(time, *(s[:n] for s in inputs), y, v, u, unbounded, clipped_v, clipped_u)
 
 
 def steady_state(
@@ -206,5 +168,5 @@ def noise_gain(loop: System, output: str = "output", source: str = "noise") -> f
     loop = as_loop(loop)
     require_ends(output, source)
     require_stable(loop)
-    largest = float(np.abs(loop.roots).max(initial=0.0))
+    largest = spectral_radius(loop) ** (1 / (loop.period or 1))
     return zdomain.rms_gain(*transfer(loop, source, output), largest)

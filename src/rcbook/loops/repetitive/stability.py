@@ -12,7 +12,9 @@ from rcbook import zdomain
 from rcbook.loops import memory
 from rcbook.loops import verdict as judging
 from rcbook.loops.memory import RepetitiveController, Resonators
+from rcbook.loops.repetitive.crossings import crossings, outside
 from rcbook.loops.repetitive.loop import Loop, Process, as_loop, characteristic_polynomial
+from rcbook.loops.repetitive.radii import SHORT, spectral_radii
 from rcbook.loops.verdict import MARGIN, Verdict
 from rcbook.zdomain import Plant, multiply
 
@@ -57,6 +59,8 @@ def roots(loop: Loop | Process | Plant) -> np.ndarray:
 def spectral_radius(loop: Loop | Process | Plant) -> float:
     """Largest growth of a mode over one period; over one sample without a controller."""
     loop = as_loop(loop)
+    if loop.repetitive is not None and characteristic_polynomial(loop).size > SHORT:
+        return float(spectral_radii(loop, loop.repetitive.gain))
     largest = np.abs(loop.roots).max(initial=0.0)
     with np.errstate(over="ignore"):
         return float(largest ** (loop.period or 1))
@@ -71,7 +75,7 @@ def verdict(loop: Loop | Process | Plant) -> Verdict:
     polynomial = np.trim_zeros(characteristic_polynomial(loop), "b")
     method, degree = "argument principle", polynomial.size - 1
     try:
-        perhaps, surely = (_outside(polynomial, 1 + side * MARGIN) for side in (-1, 1))
+        perhaps, surely = (outside(polynomial, 1 + side * MARGIN) for side in (-1, 1))
     except ZeroDivisionError:
         return Verdict("undecided", method, "a multiple root on the unit circle, or next to it")
     known = perhaps == surely
@@ -80,37 +84,6 @@ def verdict(loop: Loop | Process | Plant) -> Verdict:
     if not known:
         certificate += f", {perhaps - surely} within {MARGIN:g} of it"
     return Verdict(word, method, certificate, surely if known else None)
-
-
-def _outside(polynomial: np.ndarray, radius: float) -> int:
-    """Roots of p(z^-1) outside of a circle, from its turns along the upper half.
-
-    A step is halved until the logarithmic derivative says that it turns by less than 1 rad: an
-    angle alone would not tell the whole turn next to a double root from none.
-    Raises ZeroDivisionError where p is nothing but rounding.
-    """
-    floor = 8 * np.finfo(float).eps * np.abs(polynomial).sum()
-    slopes = polynomial * np.arange(polynomial.size)
-
-    def along(angle: np.ndarray) -> np.ndarray:
-        z = radius * np.exp(1j * angle)
-        value = zdomain.evaluate(polynomial, z)
-        if np.abs(value).min() <= floor:
-            raise ZeroDivisionError("the polynomial vanishes on the circle")
-        return np.array([value, np.abs(zdomain.evaluate(slopes, z) / value)])
-
-    at = np.linspace(0, np.pi, 16 * polynomial.size)
-    curve = along(at)
-    while True:
-        speed = curve[1].real
-        coarse = np.flatnonzero(np.maximum(speed[1:], speed[:-1]) * np.diff(at) > 1)
-        if not coarse.size:
-            break
-        between = (at[coarse] + at[coarse + 1]) / 2
-        at = np.insert(at, coarse + 1, between)
-        curve = np.insert(curve, coarse + 1, along(between), axis=1)
-    value = curve[0]
-    return -round(np.angle(value[1:] / value[:-1]).sum() / np.pi)
 
 
 def require_stable(loop: Loop | Process | Plant) -> None:
@@ -126,8 +99,8 @@ def require_stable(loop: Loop | Process | Plant) -> None:
 def stable_gains(loop: Loop, highest: float = 100.0) -> Gains:
     """Every interval of repetitive gains up to `highest` in which the loop is stable.
 
-    Gains that put a root on the unit circle satisfy Im(n(z) conj(d(z))) = 0 there, an algebraic
-    equation in z whose roots are found; a gain from each interval between them is then tested.
+    Between the gains that put a root on the unit circle, which are all found, the number of roots
+    outside does not change; it is counted at two gains, and again where there is none.
     Raises ValueError when the loop has no repetitive controller.
     """
     return _stable_factors(*loop.with_gain(1.0).open_polynomials, highest)
@@ -168,24 +141,44 @@ def _stable_factors(d: np.ndarray, n: np.ndarray, highest: float) -> Gains:
     highest = zdomain.real_number(highest, "highest", positive=True)
     length = max(d.size, n.size)
     d, n = (np.pad(p, (0, length - p.size)) for p in (d, n))
-    crossing = np.convolve(d, n[::-1]) - np.convolve(n, d[::-1])
-    # On the unit circle coefficients below rounding do not count, as leading ones they mislead.
-    crossing[np.abs(crossing) < 1e-18 * np.abs(crossing).max()] = 0
-    crossings = np.roots(crossing)
-    z = crossings[np.abs(np.abs(crossings) - 1) < 1e-4]
-    z = np.append(z / np.abs(z), [1.0, -1.0])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        gains = -(zdomain.evaluate(d, z) / zdomain.evaluate(n, z)).real
-    # Where d has double roots on the circle, rounding puts crossings at gains of some 1e-9.
-    gains = np.unique(gains[np.isfinite(gains) & (gains > 1e-7) & (gains < highest)])
-    edges = np.concatenate([[0.0], gains, [highest]])
-    edges = edges[np.append(True, np.diff(edges) > 1e-9)]
+
+    def count(gain: float, radius: float = 1.0) -> int | None:
+        """Roots outside of a circle; None when there is one on it."""
+        try:
+            return outside(np.trim_zeros(d + gain * n, "b"), radius)
+        except ZeroDivisionError:
+            return None
+
+    for points in (8, 64, 512):
+        edges, more = _intervals(*crossings(d, n, points), highest)
+        middles = (edges[1:] + edges[:-1]) / 2
+        one, other = np.argsort(-np.diff(edges), kind="stable")[[0, min(1, more.size - 1)]]
+        known = count(middles[one])
+        if known is None:
+            return []
+        counts = more - more[one] + known
+        if count(middles[other]) == counts[other]:
+            break
+    else:
+        raise ValueError("the roots that cross the unit circle are not those that lie outside")
 
     def stable(gain: float) -> bool:
-        radii = np.abs(np.roots(np.trim_zeros(d + gain * n, "b")))
-        return bool(np.all(radii < 1 - MARGIN))
+        settled = counts[np.searchsorted(edges, gain) - 1] == 0
+        return bool(settled and count(gain, 1 - MARGIN) == 0)
 
     return _merge(edges, stable)
+
+
+def _intervals(
+    gains: np.ndarray, more: np.ndarray, highest: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Edges from 0 to `highest`, and how many more roots than at first lie outside between them."""
+    # Where d has double roots on the circle, rounding puts crossings at gains of some 1e-9.
+    within = (gains > 1e-7) & (gains < highest)
+    edges = np.concatenate([[0.0], gains[within], [highest]])
+    more = np.cumsum(np.append(0, more[within]))
+    apart = np.append(True, np.diff(edges) > 1e-9)
+    return edges[apart], more[np.flatnonzero(apart)[1:] - 1]
 
 
 def _merge(edges: np.ndarray, stable: Callable[[float], bool]) -> Gains:
