@@ -13,7 +13,7 @@ from rcbook.zdomain import real_number, whole_number
 
 _TINY = np.finfo(float).tiny
 _LARGEST_EXPONENT = 300.0  # e^300 and its inverse are far from overflow
-_CHECK_EVERY = 4  # Krylov steps between looks at the eigenvalue
+_CHECK_EVERY = 3  # Krylov steps between looks at the eigenvalue
 _RATIO_ERROR = 1e-5  # how well rvf is met by a ratio of whole numbers of steps
 _LONGEST = 2_000_000  # steps of one speed period that still fit into memory
 _CHUNK = 20_000  # steps that are held at once, of all cuts of one batch together
@@ -98,7 +98,7 @@ def _grid(rvf: float, least: int) -> tuple[int, int]:
 def _period(cut: Cut, per_turn: int, steps: int) -> _Period:
     """The steps of one period; y' = s y + force and x = Im y/(m w_d) carry the mode in contact."""
     root, gain = modal(cut.mode, cut.cutting_stiffness)
-    time, speed = clock(cut, 2 * np.pi / per_turn * np.arange(steps + 1))
+    time, speed = _clocks(cut, 2 * np.pi / per_turn * np.arange(steps + 1))
     dt = np.diff(time, axis=-1)
     values = _cubic_integrals(root[:, None] * dt)
     # the old surface was cut at another speed: its slope in time is rescaled
@@ -117,6 +117,13 @@ def _period(cut: Cut, per_turn: int, steps: int) -> _Period:
         -unit * (values[2] + values[3] * dt * slope[:, 1:].conj()),
         decay,
     )
+
+
+def _clocks(cut: Cut, angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Time and speed of cuts of one rvf; those of one rva share a clock, but for its unit."""
+    rva, which = np.unique(cut.rva, return_inverse=True)
+    time, speed = clock(replace(cut, speed=1.0, rva=rva, rvf=cut.rvf[0], cutting_stiffness=1.0), angle)
+    return time[which] / cut.speed[:, None], speed[which] * cut.speed[:, None]
 
 
 def _cubic_integrals(z: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -156,6 +163,7 @@ def _dominant(period: _Period, tolerance: float, most: int) -> tuple[np.ndarray,
     basis, projected = np.empty((cuts, most + 1, n)), np.zeros((cuts, most + 1, most))
     basis[:, 0] = np.random.default_rng(1).standard_normal(n)
     basis[:, 0] /= np.linalg.norm(basis[:, 0], axis=-1, keepdims=True)
+    slowest = 0  # the cut to look at: all of them only when this one has converged
     for k in range(most):
         now = np.ascontiguousarray(basis[:, k]).view(complex)
         image = np.ascontiguousarray(_advance(period, now)).view(float)
@@ -170,8 +178,12 @@ def _dominant(period: _Period, tolerance: float, most: int) -> tuple[np.ndarray,
         projected[:, k + 1, k] = size
         basis[:, k + 1] = image / np.maximum(size, _TINY)[:, None]
         if (k + 1) % _CHECK_EVERY == 0 or k + 1 == most:
-            value, residual = _ritz(projected[:, : k + 2, : k + 1])
-            if residual.max() < tolerance:
+            hessenberg = projected[:, : k + 2, : k + 1]
+            if k + 1 < most and _ritz(hessenberg[slowest, None])[1] >= tolerance:
+                continue
+            value, residual = _ritz(hessenberg)
+            slowest = np.argmax(residual)
+            if residual[slowest] < tolerance:
                 break
     return value, residual
 
