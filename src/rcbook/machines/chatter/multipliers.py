@@ -16,7 +16,6 @@ from rcbook.zdomain import real_number, whole_number
 
 _TINY = np.finfo(float).tiny
 _LARGEST_EXPONENT = 300.0  # e^300 and its inverse are far from overflow
-_CHECK_EVERY = 3  # Krylov steps between looks at the eigenvalue
 _RATIO_ERROR = 1e-5  # how well rvf is met by a ratio of whole numbers of steps
 _LONGEST = 2_000_000  # steps of one speed period that still fit into memory
 _CHUNK = 20_000  # steps that are held at once, of all cuts of one batch together
@@ -188,7 +187,7 @@ def _dominant(period: _Period, tolerance: float, most: int) -> tuple[np.ndarray,
     basis, projected = np.empty((cuts, most + 1, n)), np.zeros((cuts, most + 1, most))
     basis[:, 0] = np.random.default_rng(1).standard_normal(n)
     basis[:, 0] /= np.linalg.norm(basis[:, 0], axis=-1, keepdims=True)
-    slowest = 0  # the cut to look at: all of them only when this one has converged
+    slowest, look = 0, 3  # the cut to look at, and when: all of them only when it has converged
     for k in range(most):
         now = np.ascontiguousarray(basis[:, k]).view(complex)
         image = np.ascontiguousarray(_advance(period, now)).view(float)
@@ -202,7 +201,8 @@ def _dominant(period: _Period, tolerance: float, most: int) -> tuple[np.ndarray,
             raise ValueError("chatter outgrows all numbers in one period; choose a larger rvf")
         projected[:, k + 1, k] = size
         basis[:, k + 1] = image / np.maximum(size, _TINY)[:, None]
-        if (k + 1) % _CHECK_EVERY == 0 or k + 1 == most:
+        if k + 1 in (look, most):
+            look += max(3, look // 4)
             hessenberg = projected[:, : k + 2, : k + 1]
             if k + 1 < most and _ritz(hessenberg[slowest, None])[1] >= tolerance:
                 continue
