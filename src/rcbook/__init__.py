@@ -5,7 +5,7 @@ __version__ = "0.1.0"
 # The house, from the ground up: rooms of a floor import from floors below it, and rooms of one
 # floor do not know each other.
 FLOORS = (
-    ("zdomain", "ledger"),
+    ("spread", "zdomain", "ledger"),
     ("signals",),
     ("identify", "loops", "machines"),
     ("pictures",),

@@ -4,6 +4,7 @@ The clock of the spindle is the library's; its own test holds it against the spe
 """
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 
@@ -62,3 +63,25 @@ def exact_exponent(cut, near, harmonics=110):
                 found.append(now - start + near)
                 break
     return min(found, key=lambda exact: abs(exact - near))
+
+
+def unstable_multipliers(cut, stiffness, harmonics=60, phases=96):
+    """Number of multipliers outside of the unit circle at each stiffness: argument principle.
+
+    Hill's matrix is A + K B, so that the eigenvalues of B/A on the circle count them for every K:
+    det(I + K B/A) has no pole outside, and turns once round the origin for each of its zeros there.
+    Also whether the phase was followed in steps below 2.5 rad; else one lies too near the circle.
+    """
+    bare = replace(cut, cutting_stiffness=1e-12 * cut.mode.stiffness)
+    sigma = 0.5j * float(cut.rvf) * (np.arange(phases) + 0.5) / phases  # half of the circle
+    loci = []
+    for s in sigma:
+        a, _ = hill(bare, s, harmonics)
+        echo = np.exp(-2 * np.pi * (s + 1j * float(cut.rvf) * np.arange(-harmonics, harmonics + 1)))
+        loci.append(np.linalg.eigvals(np.linalg.solve(a, np.diag(1 - echo))))
+    factors = 1 + np.asarray(stiffness)[:, None, None] * np.array(loci)
+    half = np.angle(factors).sum(axis=-1)
+    circle = np.concatenate([half, -half[:, ::-1], half[:, :1]], axis=1)
+    steps = (np.diff(circle, axis=1) + np.pi) % (2 * np.pi) - np.pi
+    number = -np.rint(steps.sum(axis=1) / (2 * np.pi)).astype(int)
+    return number, np.abs(steps).max(axis=1) < 2.5

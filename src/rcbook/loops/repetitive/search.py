@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
+from functools import partial
 
 import numpy as np
 import scipy.optimize
@@ -13,6 +15,7 @@ from rcbook.loops.repetitive.loop import Loop, Process
 from rcbook.loops.repetitive.response import respond
 from rcbook.loops.repetitive.stability import controller_polynomials
 from rcbook.loops.run import Run
+from rcbook.spread import spread
 from rcbook.zdomain import evaluate
 
 
@@ -23,25 +26,27 @@ def acceptable_gains(
     reference: ArrayLike,
     *,
     disturbance: ArrayLike | None = None,
+    executor: Executor | None = None,
 ) -> tuple[float, float]:
     """Lowest and highest repetitive gain at which `fault` of the response changes its sign.
 
     `fault` is negative where a run is acceptable.  Changes are looked for between neighbours of
-    `gains`, and refined to 1e-12.
+    `gains`, whose runs the workers of an `executor` share, and refined to 1e-12.
     Raises ValueError where the fault does not change its sign twice.
     """
-
-    def at(gain: float) -> float:
-        return fault(respond(loop.with_gain(gain), reference, disturbance=disturbance))
-
+    at = partial(_fault_at, loop, fault, reference, disturbance)
     gains = signals.signal(gains, "gains")
-    changes = np.flatnonzero(np.diff(np.sign([at(gain) for gain in gains])))
+    changes = np.flatnonzero(np.diff(np.sign(spread(at, gains, executor))))
     if changes.size < 2:
         raise ValueError(f"{changes.size} ends of a range among {gains.size} gains; try others")
     low, high = (
         scipy.optimize.brentq(at, gains[i], gains[i + 1], xtol=1e-12) for i in changes[[0, -1]]
     )
     return low, high
+
+
+def _fault_at(loop: Loop, fault: Callable, reference, disturbance, gain: float) -> float:
+    return fault(respond(loop.with_gain(gain), reference, disturbance=disturbance))
 
 
 def meeting_gains(process: Process) -> np.ndarray:

@@ -20,7 +20,7 @@ def stability_limit(
     Searched upward in steps of `ratio` from 0.7 of the least limit at constant speed, or from
     where the cut is stable, up to `highest` times that limit, beyond which it is infinite; then
     bisected to a relative `precision`.  An instability narrower than a step of the search can be
-    missed.  The options are those of `floquet`.
+    missed; `stability_chart` finds it.  The options are those of `floquet`.
     Raises ValueError when `highest` or `ratio` is not above 1, or the precision is not positive.
     """
     precision = real_number(precision, "precision", positive=True)

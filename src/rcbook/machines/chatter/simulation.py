@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,6 +39,12 @@ class Run:
             raise ValueError(f"turns = {turns!r} are not in the record; simulate longer")
         return np.std(self.displacement[..., -samples:], axis=-1)
 
+    def until(self, turns: float) -> Run:
+        """The first turns of this run; as long as itself if it ends before."""
+        end = round(real_number(turns, "turns", positive=True) * self.per_turn) + 1
+        names = ("angle", "time", "displacement", "velocity", "force", "surface")
+        return replace(self, **{name: getattr(self, name)[..., :end] for name in names})
+
 
 def simulate(
     cut: Cut,
@@ -63,13 +69,22 @@ def simulate(
     needed = steps_needed(cut, whole_number(per_cycle, "per_cycle", 8))
     per_turn = int(needed.max())
     angle = 2 * np.pi / per_turn * np.arange(int(np.ceil(turns * per_turn)) + 1)
-    time, _ = clock(cut, angle)
+    clocks, which = _clocks(cut)
     # samples first: every step of the march then reads one contiguous row
-    rows = np.moveaxis(time.reshape(-1, angle.size), -1, 0)
-    forced = np.zeros_like(rows) if disturbance is None else _samples(disturbance, rows)
-    march = _march(cut, rows, forced, (chip, real_number(kick, "kick")), per_turn)
-    shaped = (np.moveaxis(row, 0, -1).reshape(time.shape) for row in march)
-    return Run(cut, per_turn, angle, time, *shaped)
+    time = np.ascontiguousarray(clock(clocks, angle)[0].T)
+    forced = np.zeros_like(time) if disturbance is None else _samples(disturbance, time)
+    rows = time[:, which], forced[:, which]
+    march = _march(cut, *rows, (chip, real_number(kick, "kick")), per_turn)
+    shape = (*cut.shape, angle.size)
+    time, *march = (row.T.reshape(shape) for row in (rows[0], *march))
+    return Run(cut, per_turn, angle, time, *march)
+
+
+def _clocks(cut: Cut) -> tuple[Cut, np.ndarray]:
+    """Cuts of every clock that there is, and which of them each cut has."""
+    numbers = np.stack([cut.speed.ravel(), cut.rva.ravel(), cut.rvf.ravel()])
+    _, first, which = np.unique(numbers, axis=1, return_index=True, return_inverse=True)
+    return cut.take(first), which.ravel()
 
 
 def _samples(disturbance: Callable[[np.ndarray], np.ndarray], time: np.ndarray) -> np.ndarray:
@@ -91,19 +106,21 @@ def _march(
     dt = np.diff(time, axis=0)
     free, early, late = _ramp_response(root * dt)
     early, late = early * dt, late * dt
-    give = 1 + stiffness * gain * late.imag  # the tool yields to the force of the same instant
+    # the tool yields to the force of the same instant
+    grip = stiffness / (1 + stiffness * gain * late.imag)
+    pushed = early * forced[:-1] + late * forced[1:]
     steady = stiffness * chip / cut.mode.stiffness
-    x, v, force = np.zeros((3, *time.shape))
-    left = np.zeros((per_turn + len(time), time.shape[1]))  # from one turn before the start
-    left[: per_turn + 1], x[0], v[0], force[0] = steady, steady, kick, stiffness * chip
-    y = (kick - x[0] * root.real) / (gain * root.imag) + 1j * x[0] / gain
+    y, force = np.empty(time.shape, dtype=complex), np.empty(time.shape)
+    left = np.empty((per_turn + len(time), time.shape[1]))  # from one turn before the start
+    left[: per_turn + 1], force[0] = steady, stiffness * chip
+    y[0] = (kick - steady * root.real) / (gain * root.imag) + 1j * steady / gain
     for j in range(len(dt)):
-        y = free[j] * y + early[j] * (force[j] + forced[j]) + late[j] * forced[j + 1]
         ahead = left[j + 1] + chip
-        force[j + 1] = np.maximum(0, stiffness * (ahead - gain * y.imag) / give[j])
-        y += late[j] * force[j + 1]
-        x[j + 1], v[j + 1] = gain * y.imag, gain * (root * y).imag
-        left[per_turn + j + 1] = np.minimum(ahead, x[j + 1])
+        free_of_it = free[j] * y[j] + early[j] * force[j] + pushed[j]
+        force[j + 1] = np.maximum(0, grip[j] * (ahead - gain * free_of_it.imag))
+        y[j + 1] = free_of_it + late[j] * force[j + 1]
+        left[per_turn + j + 1] = np.minimum(ahead, gain * y[j + 1].imag)
+    x, v = gain * y.imag, gain * (root * y).imag
     return x, v, force, left[per_turn:]
 
 

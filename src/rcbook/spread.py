@@ -1,0 +1,28 @@
+"""One function of many pieces, in this process or by the workers of an executor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import Executor
+from typing import TypeVar
+
+Piece, Result = TypeVar("Piece"), TypeVar("Result")
+
+
+def spread(
+    function: Callable[[Piece], Result], pieces: Iterable[Piece], executor: Executor | None = None
+) -> list[Result]:
+    """Results of `function` for the pieces, in their order; the first exception is raised here.
+
+    The pieces are cut by whoever calls, whatever the number of workers, so that the results are
+    the same bit for bit.  For other processes the function must be one that pickle knows by name.
+    Raises TypeError when `executor` is not a concurrent.futures.Executor.
+    """
+    if executor is None:
+        return [function(piece) for piece in pieces]
+    if not isinstance(executor, Executor):
+        raise TypeError(
+            f"executor = {executor!r} must be a concurrent.futures.Executor; "
+            "for example ProcessPoolExecutor(2), or get_executor() of a Dask client"
+        )
+    return list(executor.map(function, list(pieces)))  # Dask maps no iterators
