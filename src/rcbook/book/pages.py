@@ -174,7 +174,7 @@ def _ledger_row(row: Mapping, paper: ledger.Paper) -> str:
     id = html.escape(row["id"])
     claim = (
         f"{show.math(row['says'])}<br><small>{show.math(row['where'])} · "
-        f'<a href="{_chapter(paper)}#{show.anchor_of(row["id"])}">'
+        f'<a href="{_page(row["notebook"])}#{show.anchor_of(row["id"])}">'
         f"{show.math(_short(paper))}</a> · "
         f'<a href="#{id}"><code>{id}</code></a></small>'
     )
@@ -296,7 +296,11 @@ def api_page() -> str:
 
 
 def _chapter(paper: ledger.Paper) -> str:
-    return f"notebooks/{PurePosixPath(paper.notebook).stem}.html"
+    return _page(paper.notebook)
+
+
+def _page(notebook: str) -> str:
+    return f"notebooks/{PurePosixPath(notebook).stem}.html"
 
 
 def _short(paper: ledger.Paper) -> str:

@@ -29,16 +29,26 @@ class Extract:
 
 @dataclass
 class Ledger:
-    """The claims of one paper and the judgements made so far, in the order of the paper."""
+    """The claims of one paper and the judgements made so far, in the order of the paper.
+
+    `notebook` is the one whose claims are to be judged.
+    """
 
     paper: Paper
+    notebook: str
     judgements: dict[str, Judgement] = field(default_factory=dict)
     _fresh: list[str] = field(default_factory=list)
 
     @classmethod
-    def of(cls, key: str) -> Ledger:
-        """An empty ledger for the paper `key`."""
-        return cls(load(key))
+    def of(cls, key: str, notebook: str = "") -> Ledger:
+        """An empty ledger for the paper `key`, in its own notebook or another that it names.
+
+        Raises ValueError for a notebook in which no claim of the paper is judged.
+        """
+        paper = load(key)
+        if notebook and notebook not in paper.notebooks:
+            raise ValueError(f"{key}.toml has no claim with notebook = {notebook!r}; give it some")
+        return cls(paper, notebook or paper.notebook)
 
     def check(self, id: str, value: object = None, corrected: object = None, **evidence):
         """Judge claim `id` (see `judge`), keep the judgement and return it.
@@ -69,8 +79,10 @@ class Ledger:
         return judgement.evidence[name]
 
     def missing(self) -> list[str]:
-        """Ids of the claims not checked yet."""
-        return [id for id in self.paper.claims if id not in self.judgements]
+        """Ids of the claims of this notebook that are not checked yet."""
+        claims = self.paper.claims.items()
+        own = (id for id, claim in claims if self.paper.place(claim) == self.notebook)
+        return [id for id in own if id not in self.judgements]
 
     def rows(self) -> list[dict]:
         """The judged claims as the list of objects that the ledger file holds."""
@@ -117,7 +129,7 @@ def _row(paper: Paper, judgement: Judgement) -> dict:
         "convention": paper.conventions[claim.convention]["text"],
         "reason": judgement.reason,
         "erratum": claim.erratum,
-        "notebook": paper.notebook,
+        "notebook": paper.place(claim),
         "kind": claim.kind,
         "reading": claim.convention,
         "evidence": _finite(dict(judgement.evidence)),
