@@ -1,4 +1,4 @@
-"""The drive, which moves on exactly while torque and command stand still."""
+"""The drive, which moves on exactly while the command stands still and the torque is a parabola."""
 
 from __future__ import annotations
 
@@ -7,96 +7,139 @@ from typing import NamedTuple
 import numpy as np
 
 from rcbook.machines import spindle_drive
+from rcbook.machines.face_mill.abreast import MANY, Arithmetic
 from rcbook.machines.spindle_drive import SpindleDrive
-
-NEWTON_STEPS = 30
-ROUNDING = 1e-13
 
 
 class Modes(NamedTuple):
-    """The drive mode by mode, first axis: in control, limited, limited with the integral held."""
+    """The drive taken apart into its modes."""
 
-    poles: np.ndarray  # (3, 5)
-    right: np.ndarray  # (3, 5, 5)
-    left: np.ndarray  # (3, 5, 5)
-    inputs: np.ndarray  # (3, 5, 3), of speed command, torque and the limited current command
-    wanted: np.ndarray  # (5,), current command per state
-    wanted_by_command: float  # current command per speed command
+    poles: list
+    right: list  # [state][mode]
+    left: list  # [mode][state]
+    command: list  # [mode] by speed command, V
+    load: list  # [mode] by torque, N m
+    current: list  # [mode] by a limited current command, V
+
+
+class Drive(NamedTuple):
+    """The drive by what its current command does, and that command by the modes in control."""
+
+    control: Modes
+    limited: Modes
+    held: Modes  # limited, and the velocity integral stands
+    wanted: list  # [mode], V
+    by_command: float  # V per V of speed command
     limit: float  # V
 
 
-def modes_of(drive: SpindleDrive) -> Modes:
+def drive_of(drive: SpindleDrive, op: Arithmetic) -> Drive:
     closed, inner = spindle_drive.speed_driven(drive), spindle_drive.current_driven(drive)
-    held = inner.A.copy()
-    held[4] = 0
-    by_command = np.array([[0, 0, 0, 0, drive.velocity_integral]]).T
-    driven = np.hstack([by_command, inner.B[:, [1, 0]]])
-    matrices = np.array([closed.A, inner.A, held])
-    inputs = np.array([np.hstack([closed.B, np.zeros((5, 1))]), driven, driven])
-    inputs[2, 4] = 0
-    poles, right = np.linalg.eig(matrices)
-    left = np.linalg.inv(right)
-    wanted = np.array([0, 0, -drive.velocity_gain, 0, 1.0])
-    return Modes(
-        poles, right, left, left @ inputs, wanted, drive.velocity_gain, drive.command_limit
+    integral = np.array([[0, 0, 0, 0, drive.velocity_integral]]).T
+    driven = np.hstack([integral, inner.B[:, [1, 0]]])
+    runs_on = np.array([[1, 1, 1, 1, 0]]).T
+    control = _modes(op, closed.A, np.hstack([closed.B, np.zeros((5, 1))]))
+    return Drive(
+        control,
+        _modes(op, inner.A, driven),
+        _modes(op, runs_on * inner.A, runs_on * driven),
+        [
+            i - drive.velocity_gain * w
+            for w, i in zip(control.right[2], control.right[4], strict=True)
+        ],
+        drive.velocity_gain,
+        drive.command_limit,
     )
 
 
-def turn(
-    modes: Modes,
-    state: np.ndarray,
-    inputs: np.ndarray,
-    holds: np.ndarray,
-    angle: float,
-    inner: int,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Seconds that the spindle takes for an angle, its state then, the smallest and the largest
-    current on the way at `inner` points, and whether the current command was limited."""
-    wanted = modes.wanted @ state + modes.wanted_by_command * inputs[0]
-    limited = np.abs(wanted) > modes.limit
-    which = np.where(limited, 1 + holds, 0)
-    if not limited.any():
-        return *_turn_in_mode(modes, 0, state, inputs, angle, inner), limited
-    inputs = np.vstack([inputs, np.sign(wanted) * modes.limit])
-    seconds, after = np.empty(state.shape[1]), np.empty(state.shape)
-    extremes = np.empty((2, state.shape[1]))
-    for mode in np.unique(which):
-        runs = which == mode
-        seconds[runs], after[:, runs], extremes[:, runs] = _turn_in_mode(
-            modes, mode, state[:, runs], inputs[:, runs], angle, inner
-        )
-    return seconds, after, extremes, limited
+def _modes(op: Arithmetic, matrix: np.ndarray, inputs: np.ndarray) -> Modes:
+    poles, right = np.linalg.eig(matrix)
+    left, kept = np.linalg.inv(right), (poles.imag >= 0) | (not op.pairs)
+    driven, right = left @ inputs, right * np.where((poles.imag > 0) & op.pairs, 2, 1)
+    real = poles[kept].imag == 0
+
+    def each(rows: np.ndarray) -> list:
+        return [op.modes(row[kept], real) for row in rows]
+
+    return Modes(*each([poles]), each(right), [*zip(*each(left.T), strict=True)], *each(driven.T))
 
 
-def _turn_in_mode(
-    modes: Modes, mode: int, state: np.ndarray, inputs: np.ndarray, angle: float, inner: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Newton's method for the time at which the angle is reached, on the exact solution."""
-    poles, right = modes.poles[mode][:, None], modes.right[mode]
-    start = modes.left[mode] @ state
-    drive = modes.inputs[mode][:, : len(inputs)] @ inputs
-    decays = poles != 0
-    with np.errstate(all="ignore"):  # a spindle that comes to rest has no solution
-        seconds = angle / state[0]
-        gain = (right[0] @ (poles * start + drive)).real * seconds
-        seconds = seconds * (1 - gain / 2 / state[0])
-        for _ in range(NEWTON_STEPS):
-            x = poles * seconds
-            rise = np.expm1(x)
-            once = np.divide(rise, poles, out=seconds + 0 * x, where=decays)
-            twice = np.divide(rise - x, poles**2, out=seconds**2 / 2 + 0 * x, where=decays)
-            speed = (right[0] @ (start * (1 + rise) + drive * once)).real
-            miss = (right[0] @ (start * once + drive * twice)).real - angle
-            if np.all(np.abs(miss) < ROUNDING * angle):
-                break
-            seconds = seconds - miss / speed
-        after = (right @ (start * (1 + rise) + drive * once)).real
-        reached = (np.abs(miss) < 1e-9 * angle) & (seconds > 0)
-        along = [after[1]]
-        for part in np.arange(1, inner) / inner:
-            x = poles * (part * seconds)
-            rise = np.expm1(x)
-            once = np.divide(rise, poles, out=part * seconds + 0 * x, where=decays)
-            along.append((right[1] @ (start * (1 + rise) + drive * once)).real)
-    extremes = np.array([np.min(along, axis=0), np.max(along, axis=0)])
-    return seconds, np.where(reached, after, 0.0), extremes
+def mixed(op: Arithmetic, runs: bool, yes: Modes, no: Modes) -> Modes:
+    """The one modes for some of many runs, and the other ones for the rest."""
+
+    def choose(a: list, b: list) -> list:
+        if isinstance(a, np.ndarray):
+            return op.choose(runs, a, b)
+        return [choose(*pair) for pair in zip(a, b, strict=True)]
+
+    return Modes(*choose(yes, no))
+
+
+def modal(modes: Modes, state: list) -> list:
+    return [sum(c * x for c, x in zip(row, state, strict=True)) for row in modes.left]
+
+
+def read(op: Arithmetic, row: list, state: list) -> float:
+    """A state of the drive, from its row of `right` and the modes."""
+    return sum(op.total((c * x).real) for c, x in zip(row, state, strict=True))
+
+
+def pushes(modes: Modes, command: float, current: float) -> list:
+    """What speed command and limited current command add to the rates of the modes."""
+    return [c * command + i * current for c, i in zip(modes.command, modes.current, strict=True)]
+
+
+def move(
+    op: Arithmetic, modes: Modes, state: list, push: list, torque: tuple, seconds: float
+) -> tuple[list, float, float]:
+    """Modes, speed and turned angle after some seconds.
+
+    `torque` has the value at the start, and the two derivatives with these seconds for a unit.
+    """
+    level, slope, curve = torque
+    after, speed, turned = [], 0.0, 0.0
+    for pole, old, by_load, by_command, seen in zip(
+        modes.poles, state, modes.load, push, modes.right[0], strict=True
+    ):
+        rate = pole * old + by_load * level + by_command
+        one, two, three, four = _weights(op, pole * seconds)
+        new = old + seconds * (one * rate + by_load * (two * slope + three * curve))
+        passed = old + seconds * (two * rate + by_load * (three * slope + four * curve))
+        after.append(new)
+        speed = speed + op.total((seen * new).real)
+        turned = turned + op.total((seen * passed).real)
+    return after, speed, seconds * turned
+
+
+def _weights(op: Arithmetic, x: complex) -> tuple:
+    """e^x less its first 1 to 4 terms, over x to the power of 1 to 4."""
+    small = abs(x) < 1e-2
+    if op.some(small):  # where differences lose digits: by the series, for the others as below
+        four = (1 + x / 5 * (1 + x / 6 * (1 + x / 7 * (1 + x / 8)))) / 24
+        three = 1 / 6 + x * four
+        two = 1 / 2 + x * three
+        series = 1 + x * two, two, three, four
+        if not op.some(small ^ True):
+            return series
+        others = _weights(op, op.choose(small, 1.0, x))
+        return tuple(op.choose(small, a, b) for a, b in zip(series, others, strict=True))
+    one = op.rise(x) / x
+    two = (one - 1) / x
+    three = (two - 1 / 2) / x
+    return one, two, three, (three - 1 / 6) / x
+
+
+def currents_within(
+    op: Arithmetic, modes: Modes, begun: list, inner: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest and largest current at `inner` points, but for the last, of steps begun so.
+
+    `begun` has the arguments of `move` one after the other, each an array.
+    """
+    count, found, over = len(modes.poles), [], MANY._replace(total=op.total)
+    state, push, (level, slope, curve, seconds) = begun[:count], begun[count:-4], begun[-4:]
+    for part in np.arange(1, inner) / inner:
+        within = level, slope * part, curve * part**2
+        after, _, _ = move(over, modes, state, push, within, seconds * part)
+        found.append(read(over, modes.right[1], after))
+    return np.min(found, axis=0), np.max(found, axis=0)

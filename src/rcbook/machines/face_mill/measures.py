@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rcbook.machines.face_mill.cut import cut_of
+from rcbook.machines.face_mill.cut import tooth_chips
 from rcbook.machines.face_mill.mill import RPM
 from rcbook.machines.face_mill.readings import OUTPUTS, one_of
 from rcbook.machines.face_mill.simulation import Run
@@ -17,12 +17,10 @@ GROWTH = 1.01  # beyond which neither rounding nor convergence decides
 def tooth_forces(run: Run) -> np.ndarray:
     """Tangential force in N on every tooth at the end of every step, shape (n + 1, teeth)."""
     one = run.experiment
-    cut, back = cut_of([one]), one.mill.samples_per_pitch * one.substeps
+    back = one.mill.samples_per_pitch * one.substeps
     before = run.time[0] - np.arange(back, 0, -1) * 2 * np.pi / one.steps_per_turn / one.mill.speed
     elapsed = run.time - np.concatenate([before, run.time])[: run.time.size]
-    forces = np.array(
-        [cut.on_teeth(*cut.chips(2 * k, np.array([t])))[:, 0] for k, t in enumerate(elapsed)]
-    )
+    forces = one.mill.cutting_coefficient * one.mill.depth * tooth_chips(one, elapsed)
     return np.where(np.isnan(run.force)[:, None], np.nan, forces)
 
 

@@ -8,14 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from rcbook.machines import spindle_drive
+from rcbook.machines.face_mill.abreast import MANY, ONE, Arithmetic
 from rcbook.machines.face_mill.cut import cut_of
-from rcbook.machines.face_mill.drive import modes_of, turn
+from rcbook.machines.face_mill.drive import Drive, currents_within, drive_of, modal, read
 from rcbook.machines.face_mill.experiment import Experiment
 from rcbook.machines.face_mill.law import law_of
 from rcbook.machines.face_mill.mill import sampling_angle
 from rcbook.machines.face_mill.readings import LOGGED
+from rcbook.machines.face_mill.step import End, Start, either, turn
 from rcbook.zdomain import whole_number
 
+FEW = 8  # runs that are quicker one by one
 ABREAST = 256  # runs computed side by side, few enough for the processor's cache
 STANDSTILL = 0.01  # of the nominal speed
 
@@ -60,11 +63,12 @@ def simulate(experiment: Experiment) -> Run:
 def simulate_all(experiments: Sequence[Experiment]) -> list[Run]:
     """Turn the cutters of several experiments, side by side where they share drive and steps.
 
-    Within a step of the angle the cutting torque is held at its value in the middle, and the drive,
-    linear between two switchings of its limit, moves on exactly; the step lasts until the angle is
-    reached.  So fast modes of the drive limit no step, and halving the step quarters the error
-    where teeth enter and leave at the ends of steps; other entries and exits, and the switching of
-    the limit, are met to within a step.
+    Within a step of the angle the cutting torque is a parabola of time, a chip that vanishes there
+    leaves its mean and its first two moments, and the drive, linear between two switchings of its
+    limit, moves on exactly; the step lasts until the angle is reached.  So fast modes of the drive
+    limit no step, and halving the step leaves a sixteenth of the error where teeth enter and leave
+    at the ends of steps; other entries and exits, and the switching of the limit, are met to within
+    a step.
 
     The current overshoots just behind a sampling instant, in less time than a step takes.  Its
     extremes are therefore looked for at `inner` points of every step's exact solution.
@@ -79,50 +83,78 @@ def simulate_all(experiments: Sequence[Experiment]) -> list[Run]:
         alike.setdefault(key, []).append(i)
     runs: dict[int, Run] = {}
     for members in alike.values():
-        for first in range(0, len(members), ABREAST):
-            some = members[first : first + ABREAST]
-            runs.update(zip(some, _side_by_side([experiments[i] for i in some]), strict=True))
+        abreast = ABREAST if len(members) >= FEW else 1
+        for first in range(0, len(members), abreast):
+            some = members[first : first + abreast]
+            with np.errstate(all="ignore"):  # of runs that one or the other step is not for
+                found = _side_by_side([experiments[i] for i in some])
+            runs.update(zip(some, found, strict=True))
     return [runs[i] for i in range(len(experiments))]
 
 
 def _side_by_side(group: list[Experiment]) -> list[Run]:
     """Runs that share drive and steps; the last axis of every array counts the runs."""
-    mill, every = group[0].mill, group[0].substeps
+    op, mill, every = ONE if len(group) == 1 else MANY, group[0].mill, group[0].substeps
     back, steps = mill.samples_per_pitch * every, group[0].turns * group[0].steps_per_turn
-    angle = sampling_angle(mill) / every
-    modes, cut, law = modes_of(mill.drive), cut_of(group), law_of(group)
-    state = rest = np.array([spindle_drive.steady_state(mill.drive, e.mill.speed) for e in group]).T
+    angle, drive = sampling_angle(mill) / every, drive_of(mill.drive, op)
+    cut, law = cut_of(group, op), law_of(group)
+    log, idle = _begun(op, group, drive, steps)
+    holds, moving = op.each(law.holds), op.each(np.ones(len(group), dtype=bool))
     # The clock at the ends and in the middle of the steps, begun one tooth pitch before the start.
-    clock = np.arange(-back, steps + 1)[:, None] * angle / rest[0]
-    middle = clock[:-1] + angle / 2 / rest[0]
-    log = np.zeros((steps + 1, len(LOGGED), len(group)))
-    log[0, :3], log[0, 7:] = (clock[back], state[0], state[1]), state[1]
-    seen, error, sent = np.zeros((3, law.reach + steps // every, len(group)))
-    moving = np.ones(len(group), dtype=bool)
+    clock = [k * idle.seconds for k in range(-back, 1)]
+    middle = [(k + 0.5) * idle.seconds for k in range(-back, 0)]
+    signals = seen, _, sent = np.zeros((3, law.reach + steps // every, len(group)))
+    end, before, walked, rows = idle, idle, [], log[:, :, 0] if op is ONE else log
     for step in range(steps):
-        now, speed, trend = back + step, state[0], (state[0] - log[step - 1, 1]) / 2
         if step % every == 0:
-            k = law.reach + step // every
-            seen[k] = law.measure(log[max(0, step - back + 1) : step + 1], every)
-            at_work = moving & (step // every >= law.first)
-            error[k] = np.where(at_work, law.target - seen[k], 0.0)
-            sent[k] = law.answer(error, sent, k)
-        ahead = speed + np.where(moving & (step > 0), trend, 0.0)  # speed in the middle
-        guess = clock[now] + angle / 2 / speed
-        _, load, _ = cut.loads(2 * step + 1, guess - middle[step], ahead)
-        inputs = np.array([law.base + sent[k], load])
-        seconds, after, extremes, limited = turn(
-            modes, state, inputs, law.holds, angle, group[0].inner
-        )
-        moving = moving & (after[0] > STANDSTILL * rest[0])
-        state = np.where(moving, after, rest)
-        clock[now + 1] = clock[now] + np.where(moving, seconds, angle / rest[0])
-        bend = angle / 8 * (1 / speed - 1 / state[0])
-        middle[now] = (clock[now] + clock[now + 1]) / 2 + bend
-        loads = cut.loads(2 * step + 2, clock[now + 1] - clock[step + 1], state[0])
-        row = (clock[now + 1], *state[:2], *loads, limited, *extremes)
-        log[step + 1] = np.where(moving, row, np.nan)
-    return [_run(one, i, log, seen, law.base + sent, law.reach) for i, one in enumerate(group)]
+            recent = log[max(0, step - back + 1) : step + 1]
+            command = op.each(law.base + law.sample(signals, recent, step // every, moving))
+        now, teeth = clock[-1], cut.meeting(step)
+        since = now - clock[step], now - middle[step], now - clock[step + 1]
+        guess = end.seconds**2 / before.seconds  # stays positive when the spindle stops
+        start = Start(angle, end.state, end.speed, command, teeth, since, guess, moving)
+        before, (end, limited, *begun) = end, turn(cut, drive, holds, start)
+        moving = moving & end.reached & (end.speed > STANDSTILL * idle.speed)
+        if op.some(moving ^ True):
+            end = either(op, moving, end, idle)
+        clock.append(now + end.seconds)
+        middle.append(now + end.seconds / 2 + end.ahead)
+        current = read(op, drive.control.right[1], end.state)
+        loads = cut.at_end(teeth, clock[-1] - clock[step + 1], end.speed)
+        row = clock[-1], end.speed, current, *loads, limited, current, current
+        if op.some(moving ^ True):
+            row = [op.choose(moving, value, np.nan) for value in row]
+        rows[step + 1] = row
+        if group[0].inner > 1:
+            walked.append((step + 1, *begun))
+    _widen(op, log, walked, group[0].inner)
+    commands = law.base + sent  # once: every run keeps a column, and so the whole
+    return [_run(one, i, log, seen, commands, law.reach) for i, one in enumerate(group)]
+
+
+def _begun(
+    op: Arithmetic, group: list[Experiment], drive: Drive, steps: int
+) -> tuple[np.ndarray, End]:
+    """The log with its first row, and a step of the spindle that turns freely."""
+    rest = [spindle_drive.steady_state(e.mill.drive, e.mill.speed) for e in group]
+    rest, log = np.array(rest).T, np.zeros((steps + 1, len(LOGGED), len(group)))
+    log[0, 1:3], log[0, 7:] = rest[:2], rest[1]
+    speed, angle = op.each(rest[0]), 2 * np.pi / group[0].steps_per_turn
+    return log, End(angle / speed, 0.0, speed, True, modal(drive.control, op.each(rest)))
+
+
+def _widen(op: Arithmetic, log: np.ndarray, walked: list[tuple], inner: int) -> None:
+    """Let the extremes of the current in the log take in those between the ends of steps."""
+    by_modes: dict[int, list] = {}
+    for part in walked:
+        by_modes.setdefault(id(part[1]), []).append(part)
+    for parts in by_modes.values():
+        steps, (modes, *_), begun = zip(*parts, strict=True)
+        columns = [op.string(column) for column in zip(*begun, strict=True)]
+        within, steps = currents_within(op, modes, columns, inner), np.array(steps)
+        for row, extreme, found in zip((-2, -1), (np.minimum, np.maximum), within, strict=True):
+            known = log[steps, row]
+            log[steps, row] = extreme(known, found.reshape(known.shape))
 
 
 def _run(one: Experiment, i: int, log: np.ndarray, seen, command, reach: int) -> Run:
