@@ -14,12 +14,13 @@ from pathlib import Path
 import nbformat
 
 from rcbook import ledger
-from rcbook.book import house, pages
+from rcbook.book import house, pages, sliders
 from rcbook.book.execute import alternative, plain
 from rcbook.book.project import Project, read_text
 from rcbook.book.run import Run
 from rcbook.ledger import show
 from rcbook.ledger.marks import without_marks
+from rcbook.pictures.sliders import MIME as SLIDERS
 
 LEDGER = "../ledger.html"  # as a chapter sees it
 TAIL = 60  # lines of Sphinx's output shown when it fails
@@ -54,6 +55,7 @@ def fill(stage: Path, project: Project, run: Run) -> None:
     name, cell, png = cover(run.notebooks)
     (stage / "cover.png").write_bytes(png)
     shutil.copy(mathjax(), stage / "assets")
+    shutil.copy(bokeh(), stage / "assets")
     (stage / "notebooks").mkdir()
     for name, notebook in run.notebooks.items():
         text = nbformat.writes(shown(notebook))
@@ -94,6 +96,8 @@ def shown(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
             cell.metadata["mystnb"]["image"]["alt"] = without_marks(alternative(cell))
         for output in cell.get("outputs", ()):
             _link(output.get("data", {}))
+        if cell.cell_type == "code":
+            cell.outputs += _moving(cell)
     return notebook
 
 
@@ -106,13 +110,29 @@ def _link(data: dict) -> None:
         data["text/html"] = show.folded(rows, page=LEDGER)
 
 
+def _moving(cell: nbformat.NotebookNode) -> list[nbformat.NotebookNode]:
+    """What moves the pictures with sliders of a cell, each to stand behind its still picture."""
+    found = (output.get("data", {}).pop(SLIDERS, None) for output in cell.outputs)
+    elements = [sliders.element(data, alternative(cell)) for data in found if data]
+    show_html = nbformat.v4.new_output
+    return [show_html("display_data", {"text/html": element}) for element in elements]
+
+
 def mathjax() -> Path:
     """The one self-contained MathJax file of the package that vendors it."""
-    files = metadata.files("sphinx-mathjax-offline") or ()
-    for file in files:
-        if file.name == "tex-svg-full.js":
+    return _vendored("sphinx-mathjax-offline", "tex-svg-full.js")
+
+
+def bokeh() -> Path:
+    """The one script of Bokeh that draws; the page has sliders of its own."""
+    return _vendored("bokeh", "bokeh.min.js")
+
+
+def _vendored(package: str, name: str) -> Path:
+    for file in metadata.files(package) or ():
+        if file.name == name:
             return Path(file.locate())
-    raise RenderError("sphinx-mathjax-offline holds no tex-svg-full.js; install environment.txt")
+    raise RenderError(f"{package} holds no {name}; install environment.txt")
 
 
 def _sphinx(stage: Path) -> None:
