@@ -14,7 +14,7 @@ from pathlib import Path
 import nbformat
 
 from rcbook import ledger
-from rcbook.book import house, pages, sliders
+from rcbook.book import house, icons, pages, sliders
 from rcbook.book.execute import alternative, plain
 from rcbook.book.project import Project, read_text
 from rcbook.book.run import Run
@@ -23,6 +23,7 @@ from rcbook.ledger.marks import without_marks
 from rcbook.pictures.sliders import MIME as SLIDERS
 
 LEDGER = "../ledger.html"  # as a chapter sees it
+HEAVIER = 1.5  # so many times the weight of its pixels a figure of lines may have
 TAIL = 60  # lines of Sphinx's output shown when it fails
 _JUPYTER_BOOK = "from jupyter_book.cli.main import main; main()"  # it has no __main__
 _OPTIONS = ("-W", "-n", "--keep-going", "-q")
@@ -42,6 +43,7 @@ def render(project: Project, run: Run) -> Path:
     try:
         fill(stage, project, run)
         _sphinx(stage)
+        icons.replace(stage / "_build" / "html")
         swap(stage / "_build" / "html", project.html, stage / "previous")
     finally:
         shutil.rmtree(stage, ignore_errors=True)
@@ -96,6 +98,7 @@ def shown(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
             cell.metadata["mystnb"]["image"]["alt"] = without_marks(alternative(cell))
         for output in cell.get("outputs", ()):
             _link(output.get("data", {}))
+            _choose(output.get("data", {}))
         if cell.cell_type == "code":
             cell.outputs += _moving(cell)
     return notebook
@@ -108,6 +111,14 @@ def _link(data: dict) -> None:
         data["text/html"] = ledger.summary(rows, page=LEDGER)
     if rows := data.pop(ledger.SHOWN, None):
         data["text/html"] = show.folded(rows, page=LEDGER)
+
+
+def _choose(data: dict) -> None:
+    """Leave a figure as lines, which are sharp on any screen, or as pixels where these are lighter
+    by far: maps, and clouds of points."""
+    lines, pixels = data.get("image/svg+xml"), data.get("image/png")
+    if lines and pixels and len(lines) > HEAVIER * len(base64.b64decode(pixels)):
+        del data["image/svg+xml"]
 
 
 def _moving(cell: nbformat.NotebookNode) -> list[nbformat.NotebookNode]:

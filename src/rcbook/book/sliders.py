@@ -70,5 +70,6 @@ def _chart(data: Mapping) -> figure:
         if curve["points"]:
             drawn.append(chart.scatter("x", "y", source=source, color=curve["color"], size=6))
         items.append((curve["label"], drawn))
-    chart.add_layout(Legend(items=items, border_line_color=None, margin=0, padding=0), "above")
+    legend = Legend(items=items, location="top_left", border_line_color=None, margin=0, padding=0)
+    chart.add_layout(legend, "above")
     return chart

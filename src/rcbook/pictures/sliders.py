@@ -20,7 +20,7 @@ from matplotlib.lines import Line2D
 
 MIME = "application/vnd.rcbook.sliders+json"
 DIGITS = 4  # of what is sent to the page; a screen shows three
-FEW = 100  # up to so many points a curve is drawn with its points
+FEW = range(6, 101)  # points of a curve that is drawn with them; fewer are a line to compare with
 _SIZE = (8, 3.8)
 _DASHES = {"-": "solid", "--": "dashed", "-.": "dashdot", ":": "dotted"}  # as the page calls them
 
@@ -57,9 +57,9 @@ class SliderPlot:
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict:
         figure, ax = plt.subplots(figsize=_SIZE)
         draw_frame(ax, self)
+        lines = list(ax.get_lines())
         picture = io.BytesIO()
         figure.savefig(picture, format="png", dpi="figure")
-        lines = list(ax.get_lines())
         plt.close(figure)
         return {
             "text/plain": f"{self.setting()}: {self.at(*self.start).note}",
@@ -114,7 +114,7 @@ def draw_frame(ax: Axes, plot: SliderPlot) -> Axes:
     """The picture of `plot` at its start, with the setting and the note as title."""
     still = plot.at(*plot.start)
     for name, (x, y) in still.curves.items():
-        ax.plot(x, y, label=name, marker="." if x.size <= FEW else "")
+        ax.plot(x, y, label=name, marker="." if x.size in FEW else "")
     ax.set(**plot.axes)
     ax.set_title(f"{plot.setting()}\n{still.note}", fontsize="medium")
     ax.figure.legend(loc="outside lower left", ncols=3, fontsize="small")
