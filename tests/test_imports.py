@@ -11,7 +11,16 @@ from rcbook.zdomain import inverse
 PACKAGE = Path(rcbook.__file__).parent
 FLOOR = {room: i for i, rooms in enumerate(rcbook.FLOORS) for room in rooms}
 MATHEMATICS = {room for room, floor in FLOOR.items() if floor < FLOOR["pictures"]}
-BANNED = {"matplotlib", "pandas", "nbclient", "nbformat", "IPython", "rich", "jupyter_client"}
+BANNED = {
+    "bokeh",
+    "matplotlib",
+    "pandas",
+    "nbclient",
+    "nbformat",
+    "IPython",
+    "rich",
+    "jupyter_client",
+}
 SHARED = {"memory", "run", "verdict"}  # what all loops have; every other room of theirs is a loop
 MODULES = sorted(PACKAGE.rglob("*.py"))
 LINES, FUNCTION_LINES = 350, 40

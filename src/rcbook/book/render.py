@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import io
 import shutil
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from importlib import metadata
 from pathlib import Path
 
 import nbformat
+from PIL import Image
 
 from rcbook import ledger
 from rcbook.book import house, icons, pages, sliders
@@ -98,7 +100,7 @@ def shown(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
             cell.metadata["mystnb"]["image"]["alt"] = without_marks(alternative(cell))
         for output in cell.get("outputs", ()):
             _link(output.get("data", {}))
-            _choose(output.get("data", {}))
+            _lighten(output.get("data", {}))
         if cell.cell_type == "code":
             cell.outputs += _moving(cell)
     return notebook
@@ -113,12 +115,29 @@ def _link(data: dict) -> None:
         data["text/html"] = show.folded(rows, page=LEDGER)
 
 
-def _choose(data: dict) -> None:
-    """Leave a figure as lines, which are sharp on any screen, or as pixels where these are lighter
-    by far: maps, and clouds of points."""
+def _lighten(data: dict) -> None:
+    """Leave a figure as lines, which are sharp on any screen, or where these are heavier by far
+    (maps, clouds of points) as pixels of a palette."""
     lines, pixels = data.get("image/svg+xml"), data.get("image/png")
-    if lines and pixels and len(lines) > HEAVIER * len(base64.b64decode(pixels)):
-        del data["image/svg+xml"]
+    if not pixels:
+        return
+    pixels = base64.b64decode(pixels)
+    if lines and len(lines) <= HEAVIER * len(pixels):
+        del data["image/png"]
+        return
+    data.pop("image/svg+xml", None)
+    data["image/png"] = base64.b64encode(palette(pixels)).decode()
+
+
+def palette(png: bytes) -> bytes:
+    """A PNG in the 256 colours that fit it best, with less than half of the weight."""
+    picture = Image.open(io.BytesIO(png)).convert("RGBA")
+    ground = Image.new("RGBA", picture.size, "white")
+    ground.alpha_composite(picture)
+    few = ground.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    packed = io.BytesIO()
+    few.save(packed, "png", optimize=True)
+    return packed.getvalue()
 
 
 def _moving(cell: nbformat.NotebookNode) -> list[nbformat.NotebookNode]:
