@@ -25,7 +25,6 @@ from rcbook.ledger.marks import without_marks
 from rcbook.pictures.sliders import MIME as SLIDERS
 
 LEDGER = "../ledger.html"  # as a chapter sees it
-HEAVIER = 1.5  # so many times the weight of its pixels a figure of lines may have
 TAIL = 60  # lines of Sphinx's output shown when it fails
 _JUPYTER_BOOK = "from jupyter_book.cli.main import main; main()"  # it has no __main__
 _OPTIONS = ("-W", "-n", "--keep-going", "-q")
@@ -116,17 +115,17 @@ def _link(data: dict) -> None:
 
 
 def _lighten(data: dict) -> None:
-    """Leave a figure as lines, which are sharp on any screen, or where these are heavier by far
-    (maps, clouds of points) as pixels of a palette."""
-    lines, pixels = data.get("image/svg+xml"), data.get("image/png")
+    """Leave a figure as lines, which are sharp on any screen, or where these are heavier (maps,
+    clouds of points) as pixels of a palette."""
+    lines, pixels = data.get("image/svg+xml", ""), data.get("image/png")
     if not pixels:
         return
     pixels = base64.b64decode(pixels)
-    if lines and len(lines) <= HEAVIER * len(pixels):
+    if 0 < len(lines) <= len(pixels):
         del data["image/png"]
-        return
-    data.pop("image/svg+xml", None)
-    data["image/png"] = base64.b64encode(palette(pixels)).decode()
+    else:
+        data.pop("image/svg+xml", None)
+        data["image/png"] = base64.b64encode(palette(pixels)).decode()
 
 
 def palette(png: bytes) -> bytes:

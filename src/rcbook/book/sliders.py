@@ -18,7 +18,6 @@ def element(data: Mapping, alt: str) -> str:
 
     `data` is what the picture shows under its mime type, and `alt` its alternative text.
     """
-    e = html.escape
     controls = "".join(_control(slider) for slider in data["sliders"])
     sent = {name: data[name] for name in ("vectors", "frames", "notes", "sliders")}
     sent["item"] = json_item(_chart(data))
@@ -27,7 +26,7 @@ def element(data: Mapping, alt: str) -> str:
         '<div class="rcbook-sliders" hidden>'
         f'<div class="rcbook-controls" role="group" aria-label="Sliders">{controls}</div>'
         '<p class="rcbook-note" role="status"></p>'
-        f'<div class="rcbook-chart" role="img" aria-label="{e(alt)}"></div>'
+        f'<div class="rcbook-chart" role="figure" aria-label="{html.escape(alt)}"></div>'
         f'<script type="application/json">{text}</script></div>'
     )
 
@@ -56,19 +55,13 @@ def _chart(data: Mapping) -> figure:
     )
     items = []
     for i, curve in enumerate(data["curves"]):
-        source = ColumnDataSource({"x": [], "y": []}, name=f"curve-{i}")
-        drawn = [
-            chart.line(
-                "x",
-                "y",
-                source=source,
-                color=curve["color"],
-                line_dash=curve["dash"],
-                line_width=2,
-            )
-        ]
+        ink = {
+            "source": ColumnDataSource({"x": [], "y": []}, name=f"curve-{i}"),
+            "color": curve["color"],
+        }
+        drawn = [chart.line("x", "y", line_dash=curve["dash"], line_width=2, **ink)]
         if curve["points"]:
-            drawn.append(chart.scatter("x", "y", source=source, color=curve["color"], size=6))
+            drawn.append(chart.scatter("x", "y", size=6, **ink))
         items.append((curve["label"], drawn))
     legend = Legend(items=items, location="top_left", border_line_color=None, margin=0, padding=0)
     chart.add_layout(legend, "above")
