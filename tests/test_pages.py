@@ -265,7 +265,7 @@ def test_a_picture_is_moved_from_the_keyboard(visit, built, scheme):
 def test_a_moved_picture_shows_what_a_closed_form_gives(visit):
     """Passes of Q have the gain of a power of the cosine of half the angle."""
     tab = visit("notebooks/one_idea.html")
-    passes = started(tab).get_by_label("passes of Q")
+    passes = started(tab).get_by_role("slider", name="passes of Q")
     passes.focus()
     tab.keyboard.press("Home")
     for count in range(4):
