@@ -32,9 +32,10 @@ def shown(lines: str, pixels: bytes) -> dict:
 NOISE = png(np.random.default_rng(1).integers(0, 255, (60, 80, 3), dtype=np.uint8))
 
 
-def test_a_figure_is_shown_as_lines_unless_they_weigh_more_than_its_pixels():
-    assert set(shown("x" * len(NOISE), NOISE)) == {"image/svg+xml"}
-    assert set(shown("x" * (len(NOISE) + 1), NOISE)) == {"image/png"}
+def test_a_figure_is_shown_as_lines_unless_they_are_too_heavy():
+    bound = int(render.HEAVIER * len(render.palette(NOISE)))
+    assert set(shown("x" * bound, NOISE)) == {"image/svg+xml"}
+    assert set(shown("x" * (bound + 1), NOISE)) == {"image/png"}
 
 
 def test_a_palette_is_lighter_and_moves_no_pixel_far():

@@ -25,6 +25,7 @@ from rcbook.ledger.marks import without_marks
 from rcbook.pictures.sliders import MIME as SLIDERS
 
 LEDGER = "../ledger.html"  # as a chapter sees it
+HEAVIER = 2.5  # so many times the weight of its pixels a figure may have as lines
 TAIL = 60  # lines of Sphinx's output shown when it fails
 _JUPYTER_BOOK = "from jupyter_book.cli.main import main; main()"  # it has no __main__
 _OPTIONS = ("-W", "-n", "--keep-going", "-q")
@@ -115,17 +116,14 @@ def _link(data: dict) -> None:
 
 
 def _lighten(data: dict) -> None:
-    """Leave a figure as lines, which are sharp on any screen, or where these are heavier (maps,
-    clouds of points) as pixels of a palette."""
-    lines, pixels = data.get("image/svg+xml", ""), data.get("image/png")
-    if not pixels:
+    """Leave a figure as lines, which are sharp on any screen, or where these are too heavy (maps,
+    clouds of points, long runs) as pixels of a palette."""
+    if "image/png" not in data:
         return
-    pixels = base64.b64decode(pixels)
-    if 0 < len(lines) <= len(pixels):
-        del data["image/png"]
-    else:
+    packed = palette(base64.b64decode(data.pop("image/png")))
+    if not 0 < len(data.get("image/svg+xml", "")) <= HEAVIER * len(packed):
         data.pop("image/svg+xml", None)
-        data["image/png"] = base64.b64encode(palette(pixels)).decode()
+        data["image/png"] = base64.b64encode(packed).decode()
 
 
 def palette(png: bytes) -> bytes:
