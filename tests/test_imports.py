@@ -13,7 +13,16 @@ from rcbook.zdomain import inverse
 PACKAGE = Path(rcbook.__file__).parent
 FLOOR = {room: i for i, rooms in enumerate(rcbook.FLOORS) for room in rooms}
 MATHEMATICS = {room for room, floor in FLOOR.items() if floor < FLOOR["pictures"]}
-BANNED = {"matplotlib", "pandas", "nbclient", "nbformat", "IPython", "rich", "jupyter_client"}
+BANNED = {
+    "bokeh",
+    "matplotlib",
+    "pandas",
+    "nbclient",
+    "nbformat",
+    "IPython",
+    "rich",
+    "jupyter_client",
+}
 DRAWS = {"pictures", "book"}  # the rooms that may wait for what draws and runs
 SHARED = {"memory", "run", "verdict"}  # what all loops have; every other room of theirs is a loop
 MODULES = sorted(PACKAGE.rglob("*.py"))

@@ -62,7 +62,7 @@ def test_a_cell_that_judges_a_claim_is_not_passed_over_by_the_falsifier(path):
 def test_every_picture_has_words(path):
     """A cell that draws carries an alternative text for those who cannot see it."""
     for cell in code_cells(path):
-        if re.search(r"\bplt\.subplots\(|\bdraw_\w+\(", cell.source):
+        if re.search(r"\bplt\.subplots\(|\bdraw_\w+\(|\bwith_sliders\(", cell.source):
             alt = cell.metadata.get("mystnb", {}).get("image", {}).get("alt", "")
             assert len(alt) > 20, f"{cell.id}: {cell.source}"
 

@@ -1,5 +1,6 @@
 """The rendered book in a browser, from `file://` and with no network."""
 
+import math
 import re
 import shutil
 from importlib import resources
@@ -7,6 +8,8 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import sync_playwright
+
+from rcbook import ledger
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 # No sandbox: continuous integration runs as root.  The others keep the browser itself quiet.
@@ -252,3 +255,88 @@ def test_every_picture_has_words(visit, built):
 def test_search_finds_from_a_folder(visit):
     tab = visit("search.html?q=runout")
     tab.wait_for_selector("#search-results li a", timeout=15_000)
+
+
+# ---- pictures with sliders ----
+
+
+def with_sliders(built: Path) -> list[str]:
+    html = built / "book" / "_build" / "html"
+    return [p for p in pages(built) if "rcbook-sliders" in (html / p).read_text(encoding="utf-8")]
+
+
+def started(tab):
+    """The first picture with sliders of a page, when it is there to be moved."""
+    tab.locator(".cell_output:has(.rcbook-sliders)").first.scroll_into_view_if_needed()
+    tab.wait_for_selector(".rcbook-sliders[data-ready]")
+    return tab.locator(".rcbook-sliders").first
+
+
+def drawn(tab) -> list:
+    """The values of the curves of the first picture."""
+    numbered = "chart.get_model_by_name(`curve-${i}`)"
+    return tab.evaluate(
+        f"""() => {{ const chart = Bokeh.documents[0], curves = [];
+        for (let i = 0; {numbered}; i++) curves.push(Array.from({numbered}.data.y, Number));
+        return curves; }}"""
+    )
+
+
+def test_every_chapter_has_a_picture_with_sliders(built):
+    notebooks = {"one_idea.ipynb", *(ledger.load(key).notebook for key in ledger.papers())}
+    assert {f"notebooks/{name.removesuffix('.ipynb')}.html" for name in notebooks} <= {
+        *with_sliders(built)
+    }
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_picture_is_moved_from_the_keyboard(visit, built, scheme):
+    for page in with_sliders(built):
+        tab = visit(page, width=390, scheme=scheme)
+        picture = started(tab)
+        tab.evaluate("document.querySelector('.cell_output:has(.rcbook-sliders)').tabIndex = -1")
+        tab.evaluate("document.querySelector('.cell_output:has(.rcbook-sliders)').focus()")
+        tab.keyboard.press("Tab")
+        slider = picture.locator("input").first
+        assert slider.evaluate("e => e === document.activeElement"), page
+        assert slider.get_attribute("aria-label"), page
+        before, note = drawn(tab), picture.locator(".rcbook-note").inner_text()
+        said = slider.get_attribute("aria-valuetext")
+        tab.keyboard.press("ArrowRight")
+        assert slider.get_attribute("aria-valuetext") != said, page
+        assert picture.locator("output").first.inner_text() != said, page
+        assert picture.locator(".rcbook-note").inner_text() != note, page
+        assert drawn(tab) != before, page
+        tab.keyboard.press("ArrowLeft")
+        assert str(drawn(tab)) == str(before), page
+        assert tab.evaluate("document.documentElement.scrollWidth") <= 390, page
+
+
+def test_a_moved_picture_shows_what_a_closed_form_gives(visit):
+    """Passes of Q have the gain of a power of the cosine of half the angle."""
+    tab = visit("notebooks/one_idea.html")
+    passes = started(tab).get_by_role("slider", name="passes of Q")
+    passes.focus()
+    tab.keyboard.press("Home")
+    for count in range(4):
+        x = tab.evaluate("Array.from(Bokeh.documents[0].get_model_by_name('curve-2').data.x)")
+        closed = [math.cos(math.pi * place / 20) ** (2 * count) for place in x]  # 20 a turn
+        assert drawn(tab)[2] == pytest.approx(closed, abs=1e-3)
+        tab.keyboard.press("ArrowRight")
+
+
+def test_a_picture_with_sliders_stands_still_in_print_and_without_scripts(visit, browser, built):
+    page = "notebooks/one_idea.html"
+    tab = visit(page)
+    picture, still = started(tab), tab.locator(".cell_output:has(.rcbook-sliders) img").first
+    assert picture.is_visible()
+    assert not still.is_visible()
+    tab.emulate_media(media="print")
+    assert still.is_visible()
+    assert not picture.is_visible()
+    context = browser.new_context(java_script_enabled=False)
+    tab = context.new_page()
+    tab.goto((built / "book" / "_build" / "html").as_uri() + "/" + page)
+    assert tab.locator(".cell_output:has(.rcbook-sliders) img").first.is_visible()
+    assert not tab.locator(".rcbook-sliders").first.is_visible()
+    context.close()

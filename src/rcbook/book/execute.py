@@ -30,6 +30,13 @@ LIMIT = 900.0  # s per notebook; the slowest honest one needs about a sixth on t
 
 _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 
+# Figures as lines and as pixels: the renderer takes what suits each.  A date would make two builds
+# of one commit differ.
+_FIGURES = """
+c.InlineBackend.figure_formats = {"svg", "png"}
+c.InlineBackend.print_figure_kwargs = {"bbox_inches": "tight", "metadata": {"Date": None}}
+"""
+
 # What a user's own set-up could leak into a kernel, and so into the verdicts.
 _LEAKS = ("MPLBACKEND", "MPLSTYLE", "PYTHONSTARTUP", "PYTHONWARNINGS", "PYTHONPATH")
 
@@ -149,6 +156,9 @@ def kernel_environment(scratch: Path) -> dict[str, str]:
     environment = {name: value for name, value in os.environ.items() if name not in _LEAKS}
     style = scratch / "matplotlibrc"  # empty, and found before the user's
     style.touch()
+    profile = scratch / "ipython" / "profile_default"
+    profile.mkdir(parents=True)
+    (profile / "ipython_kernel_config.py").write_text(_FIGURES, encoding="utf-8")
     # Notebooks run side by side already; and sums on one thread have one order.
     threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
     environment |= threads | {

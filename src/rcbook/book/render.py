@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import io
 import re
 import shutil
 import subprocess
@@ -13,18 +14,21 @@ from importlib import metadata
 from pathlib import Path
 
 import nbformat
+from PIL import Image
 
 from rcbook import ledger
-from rcbook.book import cost, house, pages
+from rcbook.book import cost, house, icons, pages, sliders
 from rcbook.book.execute import alternative, plain
 from rcbook.book.project import Project, read_text
 from rcbook.book.run import Run
 from rcbook.ledger import show
 from rcbook.ledger.marks import without_marks
+from rcbook.pictures.sliders import MIME as SLIDERS
 
 LEDGER = "../ledger.html"  # as a chapter sees it
 _CORNER = re.compile(r"<th[^>]*>(?:&nbsp;)?</th>")
 _WORDS_A_MINUTE = 200  # of a text with formulas
+HEAVIER = 2.5  # so many times the weight of its pixels a figure may have as lines
 TAIL = 60  # lines of Sphinx's output shown when it fails
 _JUPYTER_BOOK = "from jupyter_book.cli.main import main; main()"  # it has no __main__
 _OPTIONS = ("-W", "-n", "--keep-going", "-q")
@@ -44,6 +48,7 @@ def render(project: Project, run: Run) -> Path:
     try:
         fill(stage, project, run)
         _sphinx(stage)
+        icons.replace(stage / "_build" / "html")
         swap(stage / "_build" / "html", project.html, stage / "previous")
     finally:
         shutil.rmtree(stage, ignore_errors=True)
@@ -57,6 +62,7 @@ def fill(stage: Path, project: Project, run: Run) -> None:
     name, cell, png = cover(run.notebooks)
     (stage / "cover.png").write_bytes(png)
     shutil.copy(mathjax(), stage / "assets")
+    shutil.copy(bokeh(), stage / "assets")
     (stage / "notebooks").mkdir()
     for name, notebook in run.notebooks.items():
         text = nbformat.writes(shown(notebook))
@@ -99,6 +105,9 @@ def shown(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
             cell.metadata["mystnb"]["image"]["alt"] = without_marks(alternative(cell))
         for output in cell.get("outputs", ()):
             _link(output.get("data", {}))
+            _lighten(output.get("data", {}))
+        if cell.cell_type == "code":
+            cell.outputs += _moving(cell)
     return notebook
 
 
@@ -121,13 +130,51 @@ def _link(data: dict) -> None:
         data["text/html"] = _CORNER.sub("<td></td>", data["text/html"])
 
 
+def _lighten(data: dict) -> None:
+    """Leave a figure as lines, which are sharp on any screen, or where these are too heavy (maps,
+    clouds of points, long runs) as pixels of a palette."""
+    if "image/png" not in data:
+        return
+    packed = palette(base64.b64decode(data.pop("image/png")))
+    if not 0 < len(data.get("image/svg+xml", "")) <= HEAVIER * len(packed):
+        data.pop("image/svg+xml", None)
+        data["image/png"] = base64.b64encode(packed).decode()
+
+
+def palette(png: bytes) -> bytes:
+    """A PNG in the 256 colours that fit it best, with less than half of the weight."""
+    picture = Image.open(io.BytesIO(png)).convert("RGBA")
+    ground = Image.new("RGBA", picture.size, "white")
+    ground.alpha_composite(picture)
+    few = ground.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    packed = io.BytesIO()
+    few.save(packed, "png", optimize=True)
+    return packed.getvalue()
+
+
+def _moving(cell: nbformat.NotebookNode) -> list[nbformat.NotebookNode]:
+    """What moves the pictures with sliders of a cell, each to stand behind its still picture."""
+    found = (output.get("data", {}).pop(SLIDERS, None) for output in cell.outputs)
+    elements = [sliders.element(data, alternative(cell)) for data in found if data]
+    show_html = nbformat.v4.new_output
+    return [show_html("display_data", {"text/html": element}) for element in elements]
+
+
 def mathjax() -> Path:
     """The one self-contained MathJax file of the package that vendors it."""
-    files = metadata.files("sphinx-mathjax-offline") or ()
-    for file in files:
-        if file.name == "tex-svg-full.js":
+    return _vendored("sphinx-mathjax-offline", "tex-svg-full.js")
+
+
+def bokeh() -> Path:
+    """The one script of Bokeh that draws; the page has sliders of its own."""
+    return _vendored("bokeh", "bokeh.min.js")
+
+
+def _vendored(package: str, name: str) -> Path:
+    for file in metadata.files(package) or ():
+        if file.name == name:
             return Path(file.locate())
-    raise RenderError("sphinx-mathjax-offline holds no tex-svg-full.js; install environment.txt")
+    raise RenderError(f"{package} holds no {name}; install environment.txt")
 
 
 def _sphinx(stage: Path) -> None:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable
 from rcbook.pictures.blocks import Block, Frame, Node, Sum, Wire, path, row
 from rcbook.pictures.results import GREY, LABELS, mark_revolutions, table, use_style
 from rcbook.pictures.sketch import Sketch
+from rcbook.pictures.sliders import with_sliders
 
 
 def drawings(folders: Iterable[str]) -> dict[str, Callable]:
