@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from rcbook import zdomain
 from rcbook.loops.memory import resonators
@@ -46,14 +46,13 @@ class Feedback:
         return self.gain * self.unit
 
 
-def late(controller: Feedback, samples: int) -> Feedback:
-    """The same controller, its answer `samples` late: a computer that needs that long.
+def as_feedback(controller: Any, late: int = 0) -> Feedback:
+    """Any controller with numerator, denominator and period, its answer `late` samples later.
 
-    Raises ValueError for samples that are not whole or negative.
+    Raises ValueError for a lateness that is not whole or negative.
     """
-    samples = zdomain.whole_number(samples, "samples", 0)
-    numerator = shift(controller.numerator, samples)
-    return Feedback(numerator, controller.denominator, controller.period)
+    late = zdomain.whole_number(late, "late", 0)
+    return Feedback(shift(controller.numerator, late), controller.denominator, controller.period)
 
 
 def proportional_integral(period: float, gain: float, alpha: float) -> Feedback:
@@ -109,12 +108,3 @@ def disturbance_observer(plant: Plant, period: float, pole: float) -> Feedback:
     seen = (1 - pole) * shift(b_minus / steady, plant.delay)
     denominator = multiply(b_plus, add(np.array([1.0, -pole]), -seen))
     return Feedback((1 - pole) * plant.a / steady, denominator, period)
-
-
-def measured(signal: ArrayLike, step: float) -> np.ndarray:
-    """What a converter of `step` makes of a signal: the nearest multiple.
-
-    Raises ValueError for a step that is not positive.
-    """
-    step = zdomain.real_number(step, "step", positive=True)
-    return step * np.round(np.asarray(signal, dtype=float) / step)

@@ -5,6 +5,8 @@ The closed loop repeats with the plant, and is a `PeriodicPlant` itself: one for
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -35,6 +37,15 @@ def closed(plant: PeriodicPlant, controller: Feedback | None, source: str) -> Pe
     return PeriodicPlant(a, b, np.append(plant.c, np.zeros(order)), plant.intervals)
 
 
+def commanded(plant: PeriodicPlant, controller: Feedback, loop: PeriodicPlant) -> PeriodicPlant:
+    """A loop of `closed`, seen at its command instead of its output, but for what passes directly.
+
+    A reference also passes directly, multiplied by one and the first coefficient of K.
+    """
+    _, _, h, direct = _states(controller)
+    return replace(loop, c=np.append(-direct * plant.c, h))
+
+
 def _states(controller: Feedback | None) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """f, g, h and direct of a controller: x+ = f x + g e, u = h x + direct e."""
     if controller is None:
@@ -42,9 +53,30 @@ def _states(controller: Feedback | None) -> tuple[np.ndarray, np.ndarray, np.nda
     size = max(controller.numerator.size, controller.denominator.size, 2)
     b, a = (np.pad(p, (0, size - p.size)) for p in (controller.numerator, controller.denominator))
     b, a = b / a[0], a / a[0]
-    f = np.eye(size - 1, k=1)
-    f[:, 0] = -a[1:]
-    return f, b[1:] - a[1:] * b[0], np.eye(1, size - 1)[0], float(b[0])
+    companion = np.eye(size - 1, k=1)
+    companion[:, 0] = -a[1:]
+    f, basis = _modal(companion)
+    return f, np.linalg.solve(basis, b[1:] - a[1:] * b[0]), basis[0], float(b[0])
+
+
+def _modal(companion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same matrix in blocks of one or two rows, and the basis in which it is so.
+
+    Harmonics lie close together, and powers of their companion matrix are nothing but rounding.
+    Each mode is scaled to be seen with weight one.
+    """
+    values, vectors = np.linalg.eig(companion)
+    vectors = vectors / np.where(np.abs(vectors[0]) > 0, vectors[0], 1)
+    f, basis, at = np.zeros(companion.shape), np.zeros(companion.shape), 0
+    for value, vector in zip(values, vectors.T, strict=True):
+        if value.imag < 0:
+            continue
+        pair = 2 if value.imag else 1
+        own = slice(at, at + pair)
+        f[own, own] = np.array([[value.real, value.imag], [-value.imag, value.real]])[:pair, :pair]
+        basis[:, own] = np.array([vector.real, vector.imag]).T[:, :pair]
+        at += pair
+    return f, basis
 
 
 def one_period(loop: PeriodicPlant, driven: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
@@ -94,15 +126,13 @@ def noise_gain(loop: PeriodicPlant) -> float:
 
     Root mean square over the period; infinite for a loop that is not stable.
     """
-    matrix, spread = np.eye(loop.order), np.zeros((loop.order, loop.order))
-    for a, b in zip(loop.a, loop.b, strict=True):
-        matrix, spread = a @ matrix, a @ spread @ a.T + np.outer(b, b)
-    if not np.abs(np.linalg.eigvals(matrix)).max() < 1 - 1e-9:
+    radius = spectral_radius(loop)
+    if not radius < 1 - 1e-9:
         return np.inf
-    covariance, power = spread, 0.0
-    while np.abs(matrix).max() > 1e-14:  # the sum of twice as many powers
-        covariance, matrix = covariance + matrix @ covariance @ matrix.T, matrix @ matrix
-    for a, b in zip(loop.a, loop.b, strict=True):
-        power += loop.c @ covariance @ loop.c
-        covariance = a @ covariance @ a.T + np.outer(b, b)
-    return float(np.sqrt(power / loop.period))
+    covariance, powers = np.zeros((loop.order, loop.order)), []
+    for _ in range(int(np.ceil(np.log(1e-12) / np.log(max(radius, 1e-12)))) + 2):
+        powers = []
+        for a, b in zip(loop.a, loop.b, strict=True):
+            powers.append(loop.c @ covariance @ loop.c)
+            covariance = a @ covariance @ a.T + np.outer(b, b)
+    return float(np.sqrt(np.mean(powers)))
