@@ -13,14 +13,15 @@ from control import StateSpace
 from rcbook import zdomain
 from rcbook.loops import learning, memory, periodic
 from rcbook.loops.comparison import margins, measures, rivals, varying
-from rcbook.loops.comparison.measures import Response
+from rcbook.loops.comparison.measures import Response, Task
 from rcbook.loops.comparison.tuning import Budget, Tuned, tune
 from rcbook.loops.learning import Scheme
-from rcbook.loops.periodic import PeriodicLoop
+from rcbook.loops.periodic import PeriodicLoop, PeriodicPlant
 from rcbook.loops.repetitive import Loop, RepetitiveController
 from rcbook.zdomain import Plant
 
 DAMPING = 0.02  # of a peak filter: two percent of a harmonic's frequency to either side
+SHARE = 0.1  # of a memory of second order, from period to period
 LATEST, STRONGEST = 20.0, 100.0  # samples and factors up to which a varying loop is followed
 
 
@@ -31,6 +32,33 @@ class Result:
     tuned: Tuned
     response: Response
     gain_margin: float
+
+
+def answers(result: Result, alone: Response, work: Task) -> dict[str, float]:
+    """All measures of a contender, and its margins; relative errors below 1e-6 are given as that.
+
+    NaN where there is no loop, or nothing to ask: only a loop in time has a period to be wrong.
+    """
+    tuned = result.tuned
+    asked = dict.fromkeys(measures.MEASURES, np.nan)
+    if result.response is not None:
+        asked = measures.measures(result.response, alone, work)
+        asked |= {name: max(asked[name], 1e-6) for name in measures.ERRORS}
+    period = measures.period_margin(tuned.loop, work) if isinstance(tuned.loop, Loop) else np.nan
+    return asked | {
+        "noise gain": tuned.noise_gain,
+        "delay margin": tuned.delay_margin,
+        "gain margin": result.gain_margin,
+        "period margin": period,
+    }
+
+
+def uncontrolled(plant: Plant | PeriodicPlant) -> Response:
+    """The response of a plant that is commanded by the reference itself."""
+    if isinstance(plant, Plant):
+        return measures.in_time(Loop(plant))
+    alone = varying.closed(plant, None, "reference")
+    return measures.feedforward(lambda u: varying.repeated(alone, u), memory.lead(0))
 
 
 def smoothing(width: float) -> list[float]:
@@ -67,7 +95,7 @@ def in_time(plant: Plant, period: int, budget: Budget) -> Mapping[str, Result]:
         "resonators": (lambda g, w: memory.resonators(plant, period, chosen, g), False),
         "prototype": (lambda g, w: repetitive(memory.plain(period), g), False),
         "filtered": (lambda g, w: repetitive(filtered(w), g), True),
-        "second order": (lambda g, w: repetitive(memory.several(*2 * [filtered(w)]), g), True),
+        "second order": (lambda g, w: rivals.second_order(inverse, filtered(w), g, SHARE), True),
     }
     return {name: of_loop(plant, *maker, budget) for name, maker in makers.items()}
 
@@ -108,7 +136,7 @@ def of_passes(plant: Plant, period: int, budget: Budget) -> Mapping[str, Result]
         margin = margins.pass_gain_margin(tuned.loop)
         found[name] = Result(tuned, measures.of_passes(tuned.loop), margin)
     forward = learning.zero_phase_law(plant).filter
-    alone = measures.in_time(Loop(plant))
+    alone = uncontrolled(plant)
     answer = lambda u: u - alone.settled(u, 0 * u)[0]  # noqa: E731
     return found | {"ZPETC": Result(UNTUNED, measures.feedforward(answer, forward), np.inf)}
 

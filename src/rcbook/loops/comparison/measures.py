@@ -21,6 +21,8 @@ from rcbook.loops.repetitive import Loop
 from rcbook.signals import rms
 from rcbook.zdomain import NoncausalFilter
 
+ERRORS = ("reference", "peak", "disturbance", "between")
+MEASURES = (*ERRORS, "command", "periods")
 _FEW = 0.01  # of the error without a controller, at which it counts as gone
 
 
@@ -166,30 +168,29 @@ def measures(response: Response, alone: Response, work: Task, periods: int = 200
     return found
 
 
+def error_at(loop: Loop, work: Task, change: float = 0.0) -> float:
+    """What a loop leaves of the reference error when the period is longer by a relative change."""
+    spectrum = np.fft.rfft(work.reference)[1:4]
+    angles = 2 * np.pi * np.arange(1, 1 + spectrum.size) / work.period
+    z, sizes = np.exp(1j * angles / (1 + change)), []
+    for each in (loop, replace(loop, repetitive=None)):
+        numerator, denominator = repetitive.transfer(each, "reference", "error")
+        answer = zdomain.evaluate(numerator, z) / zdomain.evaluate(denominator, z)
+        sizes.append(np.linalg.norm(answer * spectrum))
+    return float(sizes[0] / sizes[1])
+
+
 def period_margin(loop: Loop, work: Task, level: float = 0.1) -> float:
-    """Relative change of the period up to which less than `level` of the reference error is left.
+    """Relative change of the period up to which `error_at` stays below `level`.
 
     Of both signs the smaller, looked for up to a tenth; 0 where more is left without any change.
     """
-    alone = replace(loop, repetitive=None)
-    spectrum = np.fft.rfft(work.reference)[1:4]
-    angles = 2 * np.pi * np.arange(1, 1 + spectrum.size) / work.period
 
     def excess(change: float) -> float:
-        z = np.exp(1j * angles / (1 + change))
-        left, without = (_size(each, z, spectrum) for each in (loop, alone))
-        return left / without - level
+        return error_at(loop, work, change) - level
 
-    if excess(0.0) > 0:
-        return 0.0
     edges = np.append(0.0, np.geomspace(1e-4, 0.1, 61))
     return min(abs(zdomain.first_crossing(excess, sign * edges)) for sign in (1, -1))
-
-
-def _size(loop: Loop, z: np.ndarray, spectrum: np.ndarray) -> float:
-    numerator, denominator = repetitive.transfer(loop, "reference", "error")
-    answer = zdomain.evaluate(numerator, z) / zdomain.evaluate(denominator, z)
-    return float(np.linalg.norm(answer * spectrum))
 
 
 def quantised(loop: Loop, reference: np.ndarray, step: float, **inputs: np.ndarray) -> np.ndarray:

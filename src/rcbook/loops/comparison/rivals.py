@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from rcbook import zdomain
-from rcbook.loops.memory import resonators
-from rcbook.zdomain import Plant, add, multiply, shift, split_zeros
+from rcbook.loops.memory import Memory, RepetitiveController, resonators
+from rcbook.zdomain import NoncausalFilter, Plant, add, multiply, shift, split_zeros
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,3 +108,19 @@ def disturbance_observer(plant: Plant, period: float, pole: float) -> Feedback:
     seen = (1 - pole) * shift(b_minus / steady, plant.delay)
     denominator = multiply(b_plus, add(np.array([1.0, -pole]), -seen))
     return Feedback((1 - pole) * plant.a / steady, denominator, period)
+
+
+def second_order(
+    compensator: NoncausalFilter, memory: Memory, gain: float, share: float
+) -> Feedback:
+    """gain C H/(1 - H) (1 + share H/(1 - H)): proportional and integral from period to period.
+
+    A second pole at every harmonic, as `several(memory, memory)` has it, forgives an error of the
+    period; a small share spares the noise that the latter, of gain and share one, lets through.
+    Raises ValueError as `RepetitiveController` does.
+    """
+    once = RepetitiveController(compensator, memory, 1.0)
+    share = zdomain.real_number(share, "share", positive=True)
+    zero = add(np.ones(1), -(1 - share) * once.memory.polynomial)
+    denominator = multiply(once.denominator, once.memory.generator)
+    return Feedback(multiply(once.numerator, zero), denominator, once.period, gain)

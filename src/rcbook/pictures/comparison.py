@@ -1,0 +1,55 @@
+"""Heat maps of a comparison: a row for each controller, a column for each machine."""
+
+from collections.abc import Collection
+
+import numpy as np
+import pandas as pd
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+
+_DARK = 0.55  # of the map, beyond which text is white
+
+
+def draw_heat_map(
+    ax: Axes,
+    values: pd.DataFrame,
+    title: str = "",
+    high_is_good: bool = False,
+    marked: Collection[tuple[str, str]] = (),
+    never: str = "∞",
+) -> Axes:
+    """Draw positive numbers as greys on a logarithmic scale, dark where they are bad.
+
+    Every cell shows its number; `never` stands for an infinite one, a dash for none, and a star
+    behind those of the `marked` (row, column).
+    """
+    numbers = values.to_numpy(dtype=float)
+    usual = np.isfinite(numbers) & (numbers > 0)
+    logs = np.log(np.where(usual, numbers, 1.0))
+    low, high = (logs[usual].min(), logs[usual].max()) if usual.any() else (0.0, 0.0)
+    shade = np.where(usual, (logs - low) / max(high - low, 1e-3), numbers > 0)
+    shade = 0.75 * (1 - shade if high_is_good else shade)
+    pale = np.ma.masked_where(np.isnan(numbers), shade)
+    ax.imshow(pale, cmap=colormaps["Greys"], vmin=0, vmax=1, aspect="auto")
+    for i, row in enumerate(values.index):
+        for j, column in enumerate(values.columns):
+            text = _shown(numbers[i, j], never) + "*" * ((row, column) in marked)
+            color = "white" if not np.isnan(numbers[i, j]) and shade[i, j] > _DARK else "black"
+            ax.text(j, i, text, ha="center", va="center", color=color, fontsize=9)
+    ax.set_xticks(range(values.shape[1]), values.columns, fontsize=9)
+    ax.set_yticks(range(values.shape[0]), values.index, fontsize=9)
+    ax.set_title(title, fontsize=10.5)
+    ax.grid(False)
+    ax.tick_params(length=0)
+    ax.spines[:].set_visible(False)
+    return ax
+
+
+def _shown(number: float, never: str) -> str:
+    if np.isnan(number):
+        return "–"
+    if np.isinf(number):
+        return never
+    if 0 < number < 1e-3:
+        return "<0.001"
+    return f"{number:.2g}" if number < 10 else f"{number:.0f}"
