@@ -20,6 +20,7 @@ from rcbook.loops.periodic import PeriodicLoop, PeriodicPlant
 from rcbook.loops.repetitive import Loop, RepetitiveController
 from rcbook.zdomain import Plant
 
+MARGINS = ("noise gain", "delay margin", "gain margin", "period margin")
 DAMPING = 0.02  # of a peak filter: two percent of a harmonic's frequency to either side
 SHARE = 0.1  # of a memory of second order, from period to period
 LATEST, STRONGEST = 20.0, 100.0  # samples and factors up to which a varying loop is followed
@@ -45,12 +46,8 @@ def answers(result: Result, alone: Response, work: Task) -> dict[str, float]:
         asked = measures.measures(result.response, alone, work)
         asked |= {name: max(asked[name], 1e-6) for name in measures.ERRORS}
     period = measures.period_margin(tuned.loop, work) if isinstance(tuned.loop, Loop) else np.nan
-    return asked | {
-        "noise gain": tuned.noise_gain,
-        "delay margin": tuned.delay_margin,
-        "gain margin": result.gain_margin,
-        "period margin": period,
-    }
+    forgiven = (tuned.noise_gain, tuned.delay_margin, result.gain_margin, period)
+    return asked | dict(zip(MARGINS, forgiven, strict=True))
 
 
 def uncontrolled(plant: Plant | PeriodicPlant) -> Response:

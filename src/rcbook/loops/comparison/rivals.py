@@ -93,7 +93,7 @@ def disturbance_observer(plant: Plant, period: float, pole: float) -> Feedback:
     With G = z^-d B+ B-/A and the low-pass F = (1 - pole)/(1 - pole z^-1) the estimate of a
     disturbance at the plant input is F (A/(B+ b) y - z^-d B-/b u), b = B-(1): causal as it stands.
     Written on the error it is F A/(B+ b)/(1 - F z^-d B-/b), which makes of noise F z^-d B-/b.
-    Source: Ohnishi (1987); for the zeros that are kept compare Tomizuka (1987).
+    Source: Umeno and Hori (1991); of zeros that are kept only the steady gain is undone.
     Raises ValueError for a pole outside 0 <= pole < 1, an unstable plant, and one with no gain at
     z = 1.
     """
