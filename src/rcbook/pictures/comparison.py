@@ -7,6 +7,7 @@ import pandas as pd
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 
+_SPAN = np.log(4)  # of the greys at least, so that what is equal looks equal
 _DARK = 0.55  # of the map, beyond which text is white
 
 
@@ -27,13 +28,15 @@ def draw_heat_map(
     usual = np.isfinite(numbers) & (numbers > 0)
     logs = np.log(np.where(usual, numbers, 1.0))
     low, high = (logs[usual].min(), logs[usual].max()) if usual.any() else (0.0, 0.0)
-    shade = np.where(usual, (logs - low) / max(high - low, 1e-3), numbers > 0)
+    shade = np.where(usual, (logs - low) / max(high - low, _SPAN), numbers > 0)
     shade = 0.75 * (1 - shade if high_is_good else shade)
     pale = np.ma.masked_where(np.isnan(numbers), shade)
     ax.imshow(pale, cmap=colormaps["Greys"], vmin=0, vmax=1, aspect="auto")
     for i, row in enumerate(values.index):
         for j, column in enumerate(values.columns):
-            text = _shown(numbers[i, j], never) + "*" * ((row, column) in marked)
+            text = _shown(numbers[i, j], never) + "*" * bool(
+                usual[i, j] and (row, column) in marked
+            )
             color = "white" if not np.isnan(numbers[i, j]) and shade[i, j] > _DARK else "black"
             ax.text(j, i, text, ha="center", va="center", color=color, fontsize=9)
     ax.set_xticks(range(values.shape[1]), values.columns, fontsize=9)

@@ -120,7 +120,7 @@ def of_passes(plant: Plant, period: int, budget: Budget) -> Mapping[str, Result]
         return Scheme(plant, learning.zero_phase_law(plant, gain, "peak", smoothing(width)), period)
 
     def optimal(gain, width):
-        law = learning.norm_optimal_law(plant, 1 / gain, period)
+        law = learning.norm_optimal_law(plant, 1 / gain - 0.5, period)
         return Scheme(plant, replace(law, q=smoothing(width)), period)
 
     def noise_gain(scheme):

@@ -88,10 +88,11 @@ def gain_margin(loop: Loop) -> float:
     if not is_stable(loop):
         return 0.0
     angles = _angles(loop)
-    at = np.append(_crossings(lambda a: _open(loop, a).imag, angles), np.pi)
-    value = _open(loop, at)
+    at = np.append(_crossings(lambda a: _open(loop, a).imag, angles), [0.0, np.pi])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        value = _open(loop, at)
     # Between neighbours of the grid the sign of the imaginary part also changes at a pole.
-    real = np.abs(value.imag) < 1e-6 * np.abs(value)
+    real = np.isfinite(value) & (np.abs(value.imag) < 1e-6 * np.abs(value))
     factors = -1 / value[real].real
     return float(factors[factors > 1].min(initial=np.inf))
 

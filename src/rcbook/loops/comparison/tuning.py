@@ -35,8 +35,9 @@ class Budget:
 class Tuned:
     """A controller as the rule sets it, and which of the budgets it spends.
 
-    `spends` is "both", "noise" or "delay"; "noise, over on delay" where no gain holds the delay
-    margin; and "none" where no gain holds the noise budget, with no loop then.
+    `spends` is "both", "noise" or "delay"; "neither" at the largest gain that is looked for;
+    "noise, over on delay" where no gain holds the delay margin; and "none", with no loop, where no
+    gain holds the noise budget.
     """
 
     loop: Any
@@ -78,7 +79,7 @@ def tune(
 
     gain = loudest(ambitious)
     if not gain or holds(gain, ambitious):
-        return result(gain, ambitious, "noise" if gain else "none")
+        return result(gain, ambitious, "noise" if gain < _MOST else "neither")
     careful, least = (0.0, loudest(0.0)) if has_width else (np.nan, gain)
     if has_width and holds(least, careful):
         width = boundary(lambda w: holds(loudest(w), w), careful, ambitious, _PRECISION)
