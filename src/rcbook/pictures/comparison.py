@@ -1,4 +1,4 @@
-"""Heat maps of a comparison: a row for each controller, a column for each machine."""
+"""A comparison: the loop that all controllers take a place in, and heat maps of what they do."""
 
 from collections.abc import Collection
 
@@ -7,8 +7,35 @@ import pandas as pd
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 
+from rcbook.pictures import blocks
+from rcbook.pictures.blocks import Block, Node, Sum, Wire, path
+from rcbook.pictures.sketch import DISTURBED, FOCUS, PLANT
+
 _SPAN = np.log(4)  # of the greys at least, so that what is equal looks equal
 _DARK = 0.55  # of the map, beyond which text is white
+
+
+def draw_contest(ax: Axes) -> Axes:
+    """Draw the loop in which controllers are compared: each corrects what the plant gets anyway."""
+    items = [
+        Node("split", (1.0, 0.0)),
+        Sum("error", (2.4, 0.0)),
+        Block("controller", "a controller", (5.2, 0.0), FOCUS),
+        Sum("added", (8.0, 0.0), {"w": "+", "n": "+"}),
+        Sum("load", (10.2, 0.0), {"w": "+", "n": "+"}),
+        Block("plant", "a machine", (12.6, 0.0), PLANT),
+        Node("out", (14.8, 0.0)),
+        Sum("sensor", (8.0, -2.2), {"e": "+", "s": "+"}),
+    ]
+    wires = [
+        *path((0.0, 0.0), "$r$", "split", "", "error", "", "controller", "", "added"),
+        *path("added", "$v$", "load", "", "plant", "", "out", "$y$", (16.0, 0.0)),
+        Wire("split", "added", via=1.8),
+        Wire((10.2, 1.8), "load", "disturbance", color=DISTURBED),
+        *(Wire("out", "sensor", via=-2.2), Wire("sensor", "error", via=-2.2)),
+        Wire((8.0, -3.8), "sensor", "noise", color=DISTURBED),
+    ]
+    return blocks.draw_block_diagram(ax, items, wires)
 
 
 def draw_heat_map(

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from control import StateSpace
 
 from rcbook import zdomain
 from rcbook.loops import learning, memory, periodic
@@ -19,6 +18,9 @@ from rcbook.loops.learning import Scheme
 from rcbook.loops.periodic import PeriodicLoop, PeriodicPlant
 from rcbook.loops.repetitive import Loop, RepetitiveController
 from rcbook.zdomain import Plant
+
+if TYPE_CHECKING:
+    from control import StateSpace
 
 MARGINS = ("noise gain", "delay margin", "gain margin", "period margin")
 DAMPING = 0.02  # of a peak filter: two percent of a harmonic's frequency to either side
