@@ -38,7 +38,7 @@ class Result:
 
 
 def answers(result: Result, alone: Response, work: Task) -> dict[str, float]:
-    """All measures of a contender, and its margins; relative errors below 1e-6 are given as that.
+    """All measures of a contender, and its margins; relative errors below 1e-5 are given as that.
 
     NaN where there is no loop, or nothing to ask: only a loop in time has a period to be wrong.
     """
@@ -46,7 +46,7 @@ def answers(result: Result, alone: Response, work: Task) -> dict[str, float]:
     asked = dict.fromkeys(measures.MEASURES, np.nan)
     if result.response is not None:
         asked = measures.measures(result.response, alone, work)
-        asked |= {name: max(asked[name], 1e-6) for name in measures.ERRORS}
+        asked |= {name: max(asked[name], 1e-5) for name in measures.ERRORS}
     period = measures.period_margin(tuned.loop, work) if isinstance(tuned.loop, Loop) else np.nan
     forgiven = (tuned.noise_gain, tuned.delay_margin, result.gain_margin, period)
     return asked | dict(zip(MARGINS, forgiven, strict=True))
