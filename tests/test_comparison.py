@@ -10,9 +10,9 @@ import pytest
 import scipy.signal
 
 from rcbook import pictures, signals, zdomain
+from rcbook.comparison import contenders, margins, measures, rivals, tuning, varying
+from rcbook.comparison.tuning import Budget
 from rcbook.loops import learning, memory, periodic, repetitive
-from rcbook.loops.comparison import contenders, margins, measures, rivals, tuning, varying
-from rcbook.loops.comparison.tuning import Budget
 from rcbook.loops.learning import Scheme
 from rcbook.loops.periodic import PeriodicLoop
 from rcbook.loops.repetitive import Loop, RepetitiveController

@@ -8,6 +8,7 @@ FLOORS = (
     ("spread", "zdomain", "ledger"),
     ("signals",),
     ("identify", "loops", "machines"),
+    ("comparison",),
     ("pictures",),
     ("book",),
     ("cli",),

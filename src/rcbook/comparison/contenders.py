@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rcbook import zdomain
+from rcbook.comparison import margins, measures, rivals, varying
+from rcbook.comparison.measures import Response, Task
+from rcbook.comparison.tuning import Budget, Tuned, tune
 from rcbook.loops import learning, memory, periodic
-from rcbook.loops.comparison import margins, measures, rivals, varying
-from rcbook.loops.comparison.measures import Response, Task
-from rcbook.loops.comparison.tuning import Budget, Tuned, tune
 from rcbook.loops.learning import Scheme
 from rcbook.loops.periodic import PeriodicLoop, PeriodicPlant
 from rcbook.loops.repetitive import Loop, RepetitiveController

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rcbook.loops.comparison.rivals import Feedback
+from rcbook.comparison.rivals import Feedback
 from rcbook.loops.periodic import PeriodicPlant
 from rcbook.loops.verdict import SOURCES
 from rcbook.signals import signal

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rcbook import zdomain
+from rcbook.comparison import varying
+from rcbook.comparison.rivals import Feedback
 from rcbook.loops import learning, periodic, repetitive
-from rcbook.loops.comparison import varying
-from rcbook.loops.comparison.rivals import Feedback
 from rcbook.loops.learning import Scheme
 from rcbook.loops.periodic import PeriodicLoop, PeriodicPlant
 from rcbook.loops.repetitive import Loop
