@@ -31,12 +31,12 @@ class Extract:
 class Ledger:
     """The claims of one paper and the judgements made so far, in the order of the paper.
 
-    `notebook` is the one whose claims are to be judged.
+    `notebook` is the one whose claims are to be judged, if not the paper's own.
     """
 
     paper: Paper
-    notebook: str
     judgements: dict[str, Judgement] = field(default_factory=dict)
+    notebook: str = ""
     _fresh: list[str] = field(default_factory=list)
 
     @classmethod
@@ -48,7 +48,7 @@ class Ledger:
         paper = load(key)
         if notebook and notebook not in paper.notebooks:
             raise ValueError(f"{key}.toml has no claim with notebook = {notebook!r}; give it some")
-        return cls(paper, notebook or paper.notebook)
+        return cls(paper, notebook=notebook)
 
     def check(self, id: str, value: object = None, corrected: object = None, **evidence):
         """Judge claim `id` (see `judge`), keep the judgement and return it.
@@ -80,8 +80,8 @@ class Ledger:
 
     def missing(self) -> list[str]:
         """Ids of the claims of this notebook that are not checked yet."""
-        claims = self.paper.claims.items()
-        own = (id for id, claim in claims if self.paper.place(claim) == self.notebook)
+        claims, here = self.paper.claims.items(), self.notebook or self.paper.notebook
+        own = (id for id, claim in claims if self.paper.place(claim) == here)
         return [id for id in own if id not in self.judgements]
 
     def rows(self) -> list[dict]:
