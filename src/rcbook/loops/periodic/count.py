@@ -20,6 +20,7 @@ _RUN_IN = 400  # samples before the period in which the elimination settles
 _FORGOTTEN = 1e-8  # of a start, after a period, that no factor shows
 _CHANGE = 0.1  # of a factor, relative, that is tolerated when the data change by 1e-10
 _STEP = 0.5  # of a factor from one point of the circle to the next, rad or relative
+_FIRST = 13  # points of the half circle, closer to 1, which is where most that is slow happens
 _PARTS = 3  # of a step that is too large, at most
 _AT_ONCE = 21  # points; larger products are threaded, which takes longer than they do
 _NEAR = 1e-6  # relative distance of the points that give a slope; closer, rounding drowns it
@@ -188,7 +189,7 @@ def count_outside(loop: PeriodicLoop, radius: float = 1.0, most_points: int = 10
     most_points = zdomain.whole_number(most_points, "most_points")
     windows = loop.window, loop.window, _shaken(loop).window
     with np.errstate(all="ignore"):
-        seen = _follow(windows, radius, np.append(0.0, np.geomspace(0.03, np.pi, 11)))
+        seen = _follow(windows, radius, np.pi * np.linspace(0, 1, _FIRST) ** 2)
         steps, lost = _steps(seen)
         while seen.change.max() <= _CHANGE and lost.any() and seen.angles.size < most_points:
             at, between = _between(seen, steps, lost)

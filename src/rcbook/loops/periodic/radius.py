@@ -16,7 +16,9 @@ from rcbook.loops.periodic.loop import PeriodicLoop, factor
 from rcbook.loops.periodic.plant import PeriodicPlant
 
 _SHORT = 300  # samples of a period up to which all multipliers are found sooner
-_HELD = 1e-5  # relative distance of the counts that hold the radius
+_BEYOND, _HELD = 1e-7, 1e-4  # relative distances of the counts that hold the radius
+_CLIMBS = 8  # shifts from which larger neighbours are looked for
+_WITHIN = (1.0, 0.5, 0.2)  # of a distance: where one circle meets multipliers, another may not
 _MOST = 400  # points of a count
 _FROZEN = 200  # samples at which the loop is frozen to find a shift
 
@@ -26,13 +28,13 @@ def spectral_radius(loop: PeriodicLoop) -> float:
 
     Up to 300 samples, and with another memory than q z^-N, the largest of all `multipliers`, with
     the caution that is said there.  Beyond, one found by shift and invert and held by
-    `count_outside`: none lies beyond 1 + 1e-5 of it, and some beyond 1 - 1e-5.
+    `count_outside`: none lies beyond 1 + 1e-7 of it, and some beyond 1 - 1e-4.
     Raises ValueError where the counts hold none that was found, as then rounding decides.
     """
     if loop.period <= _SHORT or not loop.has_window:
         return float(np.abs(multipliers(loop)[0]))
     for value in _candidates(loop):
-        if _held(loop, value * (1 - _HELD), value * (1 + _HELD)):
+        if _held(loop, value, value * _BEYOND, value * _HELD):
             return value
     raise ValueError(
         f"no multiplier of the loop of N = {loop.period} could be held as the largest by counts; "
@@ -48,9 +50,8 @@ def radius_bounds(loop: PeriodicLoop, width: float = 1e-3) -> tuple[float, float
     """
     width = zdomain.real_number(width, "width", positive=True)
     for value in _candidates(loop):
-        low, high = value - width / 2, value + width / 2
-        if low > 0 and _held(loop, low, high):
-            return low, high
+        if width < 2 * value and (held := _held(loop, value, width / 2, width / 2)):
+            return held
     low, high = 0.0, 1.0
     while (outside := count_outside(loop, high, _MOST).outside) != 0:
         if high > 1e3:
@@ -65,10 +66,15 @@ def radius_bounds(loop: PeriodicLoop, width: float = 1e-3) -> tuple[float, float
     return low, high
 
 
-def _held(loop: PeriodicLoop, low: float, high: float) -> bool:
-    """Whether counts show the spectral radius to lie between."""
-    none = count_outside(loop, high, _MOST).outside == 0
-    return none and bool(count_outside(loop, low, _MOST).outside)
+def _held(
+    loop: PeriodicLoop, value: float, beyond: float, within: float
+) -> tuple[float, float] | None:
+    """Bounds of the spectral radius that counts show to be so close to a value."""
+    if count_outside(loop, value + beyond, _MOST).outside == 0:
+        for part in _WITHIN:
+            if count_outside(loop, value - part * within, _MOST).outside:
+                return value - part * within, value + beyond
+    return None
 
 
 def _candidates(loop: PeriodicLoop) -> Iterator[float]:
@@ -77,8 +83,13 @@ def _candidates(loop: PeriodicLoop) -> Iterator[float]:
         yield float(np.abs(multipliers(loop)[0]))
         return
     for shift in _shifts(loop):
-        rough = _nearest(loop, 1.01 * shift, 1, 1e-2)
-        yield float(np.abs(_nearest(loop, rough[0] * (1 + 1e-5), 4, 0.0)).max())
+        top, value = _largest(loop, 1.01 * shift, 1e-2), 0.0
+        for _ in range(_CLIMBS):
+            top = _largest(loop, top * (1 + 1e-6), 0.0)
+            if abs(top) <= value * (1 + 1e-12):
+                break
+            value = abs(top)
+        yield value
 
 
 def _shifts(loop: PeriodicLoop) -> np.ndarray:
@@ -98,8 +109,8 @@ def _shifts(loop: PeriodicLoop) -> np.ndarray:
     return peaks[np.argsort(-np.abs(peaks), kind="stable")]
 
 
-def _nearest(loop: PeriodicLoop, shift: complex, number: int, tolerance: float) -> np.ndarray:
-    """Multipliers nearest to a shift, by Arnoldi's method on the inverse."""
+def _largest(loop: PeriodicLoop, shift: complex, tolerance: float) -> complex:
+    """Largest of some multipliers nearest to a shift, by Arnoldi's method on the inverse."""
     once = loop.recursion
     solver = splu(once.closed(shift))
     right = np.zeros(once.matrix.shape[1], dtype=complex)
@@ -110,5 +121,5 @@ def _nearest(loop: PeriodicLoop, shift: complex, number: int, tolerance: float) 
 
     operator = LinearOperator((once.size, once.size), matvec=inverse, dtype=complex)
     begin = np.random.default_rng(0).standard_normal(once.size).astype(complex)
-    found = eigs(operator, number, tol=tolerance, v0=begin, return_eigenvectors=False)
-    return shift - 1 / found
+    found = shift - 1 / eigs(operator, 4, tol=tolerance, v0=begin, return_eigenvectors=False)
+    return complex(found[np.abs(found).argmax()])
