@@ -23,7 +23,7 @@ _STEP = 0.5  # of a factor from one point of the circle to the next, rad or rela
 _FIRST = 17  # points of the half circle, closer to 1, which is where most that is slow happens
 _PARTS = 3  # of a step that is too large, at most
 _AT_ONCE = 21  # points; larger products are threaded, which takes longer than they do
-_NEAR = 1e-6  # relative distance of the points that give a slope; closer, rounding drowns it
+_NEAR, _FAR = 1e-6, 1e-3  # relative distances of the points that give a slope
 
 
 def _factors(windows: Sequence[Window], points: np.ndarray) -> np.ndarray:
@@ -135,7 +135,7 @@ def _eliminate(
             np.matmul(equations[k], before, out=after)
         found[:, :extra] = basis[:, :extra]
         pivots[i] = points - equation[:, 0, at]
-        first /= pivots[i][:, None, None]
+        first *= (1 / pivots[i])[:, None, None]
         np.multiply(first, equation[:, :, at + 1 :], out=kept[:, :, at:-1])
         kept[:, :, at:-1] += later
         np.multiply(first, equation[:, :, :at], out=kept[:, :, :at])
@@ -202,12 +202,20 @@ def count_outside(loop: PeriodicLoop, radius: float = 1.0, most_points: int = 10
 
 
 def _follow(windows: Sequence[Window], radius: float, angles: np.ndarray) -> _Followed:
-    """Factors of a loop on a circle, just outside of it, and with changed data."""
+    """Factors of a loop on a circle, just outside of it, and with changed data.
+
+    Where rounding may drown the slope it is taken from further outside.
+    """
     points = radius * np.exp(1j * angles)
     factors = _factors(windows, np.array([points, points * (1 + _NEAR), points]))
     near, further, changed = np.moveaxis(factors, 1, 0)
-    slopes = (further / near - 1) / _NEAR
     change = np.nan_to_num(np.abs(changed / near - 1).max(axis=0), nan=np.inf)
+    seen = np.abs(further / near - 1).max(axis=0)
+    blurred = (change > _NEAR) & (change <= _CHANGE) & (seen < 10 * change)
+    distance = np.where(blurred, _FAR, _NEAR)
+    if blurred.any():
+        further[:, blurred] = _factors(windows[:1], points[None, blurred] * (1 + _FAR))[:, 0]
+    slopes = (further / near - 1) / distance
     return _Followed(angles, near, np.abs(slopes).max(axis=0), slopes.sum(axis=0), change)
 
 
