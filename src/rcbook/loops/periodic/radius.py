@@ -89,7 +89,7 @@ def _candidates(loop: PeriodicLoop) -> Iterator[float]:
             if abs(top) <= value * (1 + 1e-12):
                 break
             value = abs(top)
-        yield value
+            yield value
 
 
 def _shifts(loop: PeriodicLoop) -> np.ndarray:
