@@ -10,6 +10,8 @@ import pytest
 import scipy.signal
 from oracles.periodic import (
     BAR,
+    bar_intervals,
+    bar_loop,
     by_definition,
     closed_form_modes,
     embeddings,
@@ -36,7 +38,6 @@ from rcbook.loops.periodic import (
     plain,
     several,
 )
-from rcbook.machines import boring_bar
 
 noise = import_module("rcbook.loops.periodic.noise")
 Q20 = zdomain.symmetric_fir([0.8, 0.1])
@@ -51,17 +52,6 @@ MEMORIES = {  # of a loop of n samples with a plain memory
     "within the period": lambda memory, n: plain(4),
 }
 each_memory = pytest.mark.parametrize("kind", MEMORIES)
-
-
-def bar_intervals(n, gamma):
-    return boring_bar.sinusoidal_intervals(BAR.sampling_interval, gamma, n)
-
-
-def bar_loop(n, gamma, design="scheduled", q=(1.0,), gain=1.0):
-    intervals = bar_intervals(n, gamma)
-    designed_for = bar_intervals(n, 0.0) if design == "nominal" else intervals
-    compensator = periodic.zero_phase(BAR.plant, designed_for)
-    return PeriodicLoop(periodic.sample(BAR.plant, intervals), compensator, plain(n, q), gain)
 
 
 def random_loop(seed, n=None, gain=0.6):

@@ -12,6 +12,19 @@ BAR = boring_bar.HANSON_TSAO2000
 _FREE = Limit()
 
 
+def bar_intervals(n, gamma):
+    return boring_bar.sinusoidal_intervals(BAR.sampling_interval, gamma, n)
+
+
+def bar_loop(n, gamma, design="scheduled", q=(1.0,), gain=1.0):
+    intervals = bar_intervals(n, gamma)
+    designed_for = bar_intervals(n, 0.0) if design == "nominal" else intervals
+    compensator = periodic.zero_phase(BAR.plant, designed_for)
+    return periodic.PeriodicLoop(
+        periodic.sample(BAR.plant, intervals), compensator, periodic.plain(n, q), gain
+    )
+
+
 def by_definition(
     loop, drive, x=None, u=None, w=None, disturbance=None, repetitive=_FREE, command=_FREE
 ):

@@ -16,13 +16,12 @@ Source: Hanson and Tsao (2000), eqs 1-13 and appendix.
 
 from rcbook.loops.memory import Memory, odd_harmonic, plain, several
 from rcbook.loops.periodic.compensator import Compensator, least_squares, zero_phase
-from rcbook.loops.periodic.count import Count, count_outside, radius_bounds
+from rcbook.loops.periodic.count import Count, count_outside
 from rcbook.loops.periodic.energy import absolute_gain, energy_gain
 from rcbook.loops.periodic.growth import (
     dense,
     multipliers,
     one_period_map,
-    spectral_radius,
     transient_growth,
 )
 from rcbook.loops.periodic.lifted import (
@@ -36,6 +35,7 @@ from rcbook.loops.periodic.lifted import (
 from rcbook.loops.periodic.loop import PeriodicLoop, factor, mismatch
 from rcbook.loops.periodic.noise import noise_gain
 from rcbook.loops.periodic.plant import PeriodicPlant, balanced, between_samples, sample
+from rcbook.loops.periodic.radius import radius_bounds, spectral_radius
 from rcbook.loops.periodic.response import simulate, steady_state
 from rcbook.loops.periodic.search import frozen_gain_bound, vanishing_intervals
 from rcbook.loops.periodic.verdict import verdict

@@ -40,6 +40,8 @@ def dissipates(window: Window, levels: np.ndarray, samples: int = 5000) -> np.nd
             pulled = storage @ entry
             room = levels**2 - pulled @ entry
             good &= room > 0
+            if not good.any():
+                return good
             cross = pulled @ matrix
             share = cross / np.where(room > 0, room, np.inf)[:, None]
             storage = matrix.T @ storage @ matrix + row[:, None] * row

@@ -42,11 +42,6 @@ def multipliers(loop: PeriodicLoop) -> np.ndarray:
     return values[np.argsort(-np.abs(values), kind="stable")]
 
 
-def spectral_radius(loop: PeriodicLoop) -> float:
-    """Largest magnitude of a multiplier, per period; see `multipliers`, and `radius_bounds`."""
-    return float(np.abs(multipliers(loop)[0]))
-
-
 def transient_growth(loop: PeriodicLoop, periods: ArrayLike, iterations: int = 12) -> np.ndarray:
     """How far the content of the memory can grow in j periods, for each j of `periods`.
 

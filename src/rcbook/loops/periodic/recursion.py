@@ -106,6 +106,14 @@ class Recursion:
         back = self.solver.solve(spread[self.size :], trans="T")
         return spread[: self.size] - self.past.T @ back
 
+    def closed(self, factor: complex) -> scipy.sparse.csc_array:
+        """The system of a period that ends in `factor` times its state, less what is added."""
+        length = self.matrix.shape[1]
+        begins = scipy.sparse.eye_array(self.size, length) * factor
+        ended = (np.ones(self.size), (np.arange(self.size), self.last))
+        ends = scipy.sparse.coo_array(ended, shape=(self.size, length))
+        return scipy.sparse.vstack([begins - ends, self.matrix]).tocsc()
+
     def signals(self, timeline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """y and v of one period, a row a sample."""
         now = timeline[self.size :].reshape(self.plant.period, self.step, *timeline.shape[1:])

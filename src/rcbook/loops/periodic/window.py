@@ -40,12 +40,20 @@ class Window:
         return self.row.size
 
     @cached_property
+    def kept(self) -> np.ndarray:
+        """Where in the state everything stands but u(k-p) .. u(k-1)."""
+        return np.r_[: self.order, self.order + self.ahead : self.states]
+
+    @cached_property
     def equations(self) -> np.ndarray:
-        """Rows of next x, K u, and y where it is remembered: all of a step that is no shift."""
-        kept = self.order + self.inputs
-        y = self.matrix[:, kept : kept + 1]
+        """What is kept at k+1, without u(k), and last K u(k-p), from what is kept and the rest.
+
+        The rest is u(k-p) .. u(k-1), in this order.  Shape (N, kept + 1, s).
+        """
+        ahead = np.arange(self.order + self.ahead, self.order, -1) - 1
         row = np.broadcast_to(self.row, (self.period, 1, self.states))
-        return np.concatenate([self.matrix[:, : self.order], row, y], axis=1).astype(complex)
+        rows = np.concatenate([self.matrix[:, self.kept], row], axis=1)
+        return np.ascontiguousarray(rows[:, :, np.append(self.kept, ahead)])
 
 
 def window(plant: PeriodicPlant, taps: np.ndarray, advance: int, q: np.ndarray) -> Window:
