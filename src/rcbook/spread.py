@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor
-from typing import TypeVar
-
-Piece, Result = TypeVar("Piece"), TypeVar("Result")
+from typing import Any
 
 
 def spread(
-    function: Callable[[Piece], Result], pieces: Iterable[Piece], executor: Executor | None = None
-) -> list[Result]:
+    function: Callable[[Any], Any], pieces: Iterable[Any], executor: Executor | None = None
+) -> list[Any]:
     """Results of `function` for the pieces, in their order; the first exception is raised here.
 
     The pieces are cut by whoever calls, whatever the number of workers, so that the results are
