@@ -17,7 +17,7 @@ test: .venv/ready
 
 # On one thread, as the notebooks run; stored only if every row could be measured.
 bench: .venv/ready
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 .venv/bin/python -m pytest benchmarks \
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 .venv/bin/python -m pytest benchmarks -m "not long" \
 	  --benchmark-quiet --benchmark-json=book/cost.json.part
 	mv book/cost.json.part book/cost.json
 

@@ -52,6 +52,7 @@ def test_verdict(row, method):
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", BY)
 def test_design_and_verdict_of_a_long_period(row, method):
     """Long to run: one round.  The peer is what a short period takes."""
@@ -84,7 +85,9 @@ def test_growth_of_a_verdict(row, method):
     )
 
 
-@pytest.mark.parametrize(("n", "goal"), [(PERIOD, 1.0), (LONG, 60.0)])
+@pytest.mark.parametrize(
+    ("n", "goal"), [(PERIOD, 1.0), pytest.param(LONG, 60.0, marks=pytest.mark.long)]
+)
 def test_spectral_radius(row, n, goal):
     loop = loop_of(n, q=Q20)
     row.seconds(
