@@ -27,10 +27,21 @@ class Row:
     def __init__(self, benchmark, area: str) -> None:
         self.benchmark, self.area = benchmark, area
 
-    def faster(self, ours: Call, peer: Call, goal: float, rounds: int = 7, **words: str) -> None:
-        """How many times longer the peer takes; the goal is a least."""
+    def faster(
+        self,
+        ours: Call,
+        peer: Call,
+        goal: float,
+        rounds: int = 7,
+        parts: float = 1,
+        **words: str,
+    ) -> None:
+        """How many times longer the peer takes; the goal is a least.
+
+        Where the whole question would take the peer too long it answers one of so many `parts`.
+        """
         times, peers = self._pairs(ours, peer, rounds)
-        self._store(peers / times, goal, "at least", "x", **words)
+        self._store(parts * peers / times, goal, "at least", "x", **words)
         self._costs(times, ours, peer)
 
     def floors(self, ours: Call, floor: Call, goal: float, rounds: int = 7, **words: str) -> None:

@@ -66,15 +66,16 @@ def test_a_controlled_run_to_1e_5(row, cut):
 
 
 def test_five_hundred_runs_abreast(row):
-    """All of them beside one run of the peer: 0.6 of its time for all are 300 times a run."""
+    """All of them, of which the peer runs one."""
     one = experiment("light")
     depths = MILL.depth * np.linspace(0.9, 1.1, 500)
     many = [replace(one, mill=replace(MILL, depth=depth)) for depth in depths]
     row.faster(
         lambda: simulate_all(many),
         lambda: Reference(one, TURNS, rtol=RTOL),
-        300 / len(many),
+        300,
         rounds=3,
-        question="500 such runs abreast (0.6 is 300 times a run)",
+        parts=len(many),
+        question=f"{len(many)} such runs abreast, light cut",
         against="one run of LSODA, no worse",
     )

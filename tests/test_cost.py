@@ -129,7 +129,9 @@ def test_a_row_that_misses_its_goal_fails_nothing_and_is_said_to(tmp_path):
         "def test_a(row):\n"
         "    row.faster(list, dict, 1e6, rounds=2, question='a list', against='a dict')\n"
         "def test_b(row):\n"
-        "    row.growth([1, 2], lambda n: list, 9, question='lists', against='none')\n",
+        "    row.growth([1, 2], lambda n: list, 9, question='lists', against='none')\n"
+        "def test_c(row):\n"
+        "    row.faster(list, list, 1e3, 2, parts=1e6, question='whole', against='a millionth')\n",
         encoding="utf-8",
     )
     command = [sys.executable, "-m", "pytest", str(tmp_path), "--benchmark-quiet"]
@@ -137,6 +139,7 @@ def test_a_row_that_misses_its_goal_fails_nothing_and_is_said_to(tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "a list" in done.stdout and "NOT MET" in done.stdout
-    first, second = cost.read(tmp_path)["rows"]
+    first, second, third = cost.read(tmp_path)["rows"]
     assert (first["area"], first["met"], first["goal"]) == ("An area", False, 1e6)
     assert len(second["points"]) == 6
+    assert third["met"] and third["low"] > 1e3  # of the whole question, and not of the part asked

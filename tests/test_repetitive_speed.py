@@ -208,6 +208,9 @@ def judged_loop(seed):
 def test_stable_gains_are_those_from_all_roots(seed):
     loop = judged_loop(seed)
     found, truth = repetitive.stable_gains(loop), stable_factors(*open_polynomials(loop), 100.0)
+    # Roots of d that are double on the circle are known to 1e-8, and a gain that brings one back to
+    # it no better: what companion matrices find below 1e-6 depends on the order of their sums.
+    truth = [(0.0 if low < 1e-6 else low, high) for low, high in truth]
     # companion matrices of up to 400 coefficients; 1e-4 from the circle taken to be on it
     np.testing.assert_allclose(np.ravel(found), np.ravel(truth), rtol=1e-8, atol=1e-8)
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping
-from html import escape
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 
@@ -14,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rcbook.ledger.show import math
+from rcbook.ledger import show
 
 RUN = "cost.json"  # in the folder of the book, written by `make bench`
 _MEND = "measure anew with `make bench`"
@@ -64,57 +63,48 @@ def stamp(run: Mapping) -> str:
     missed = sum(not row["met"] for row in rows)
     return (
         f"Measured on {run['datetime'][:10]} at {commit}, with Python {machine['python']}, "
-        f"{versions}; {machine['cores']} cores of {machine['cpu']}, one of them used. "
+        f"{versions}; {machine['cores']} cores of {machine['cpu']}, "
+        "one of them used unless a row says more. "
         f"{len(rows)} questions; {len(rows) - missed} goals are met and {missed} missed.\n"
     )
 
 
 def table(rows: list[Mapping]) -> str:
     """The rows as tables, one for each area; on a phone a row is a card."""
-    head = "".join(f'<th role="columnheader" scope="col">{name}</th>' for name in _COLUMNS)
     parts = []
     for area, group in groupby(rows, key=lambda row: row["area"]):
-        body = "\n".join(map(_line, group))
-        parts.append(
-            f"### {area}\n\n```{{raw}} html\n"
-            f'<table class="rcbook-cost rcbook-cards" role="table" aria-label="{escape(area)}">'
-            f'<thead role="rowgroup"><tr role="row">{head}</tr></thead>'
-            f'<tbody role="rowgroup">\n{body}\n</tbody></table>\n```\n'
-        )
+        shown = show.cards(_COLUMNS, [("", _cells(row)) for row in group], "rcbook-cost", area)
+        parts.append(f"### {area}\n\n```{{raw}} html\n{shown}\n```\n")
     return "\n".join(parts)
 
 
 _COLUMNS = ("Question", "Compared with", "Result", "Goal", "One call", "Memory at most")
 
 
-def _line(row: Mapping) -> str:
+def _cells(row: Mapping) -> Sequence[str]:
     found, goal = (
-        math(_UNITS.get(row["unit"], "{:.3g}" + row["unit"]).format(row[key]))
+        show.math(_UNITS.get(row["unit"], "{:.3g}" + row["unit"]).format(row[key]))
         for key in ("median", "goal")
     )
     spread = f"<small>{row['low']:.3g} to {row['high']:.3g}</small>"
     met = "met" if row["met"] else "<b>missed</b>"
     took = duration(row["took"]) if "took" in row else ""
     held = " / ".join(megabytes(row[key]) for key in ("peak", "peak_against") if key in row)
-    cells = (
-        math(row["question"]),
-        math(row["against"]),
+    return (
+        show.math(row["question"]),
+        show.math(row["against"]),
         f"{found}<br>{spread}",
         f"{row['sense']} {goal}<br>{met}",
         took,
         held,
     )
-    labelled = zip(_COLUMNS, cells, strict=True)
-    tds = "".join(f'<td role="cell" data-label="{name}">{cell}</td>' for name, cell in labelled)
-    return f'<tr role="row">{tds}</tr>'
 
 
 def duration(seconds: float) -> str:
     """A time in s, ms or us, to two digits."""
-    for size, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs")):
-        if seconds >= size or unit == "µs":
-            return f"{float(f'{seconds / size:.2g}'):g} {unit}"
-    raise AssertionError
+    scales = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"))
+    size, unit = next((scale for scale in scales if seconds >= scale[0]), scales[-1])
+    return f"{float(f'{seconds / size:.2g}'):g} {unit}"
 
 
 def megabytes(size: int) -> str:
@@ -129,7 +119,7 @@ def draw_growth(ax: Axes, rows: list[Mapping]) -> Axes:
         points = np.array(row["points"])
         sizes = np.unique(points[:, 0])
         middle = [np.median(points[points[:, 0] == size, 1]) for size in sizes]
-        ax.loglog(sizes, middle, marker=marker, label=f"{row['question']}")
+        ax.loglog(sizes, middle, marker=marker, label=row["question"])
     if growing:
         low, high = (f([p[0] for row in growing for p in row["points"]]) for f in (min, max))
         least = min(p[1] for row in growing for p in row["points"])

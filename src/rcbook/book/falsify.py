@@ -113,7 +113,7 @@ def _trial(paper: Paper, notebooks: Path, name: str, size: float | None) -> Tria
         answer = Path(scratch) / "answer.json"  # a change may print what it likes
         job = json.dumps(
             {
-                "notebooks": [str(notebooks / name) for name in paper.notebooks],
+                "notebook": str(notebooks / paper.notebook),
                 "apply": code,
                 "size": size,
                 "answer": str(answer),
@@ -136,8 +136,8 @@ def _trial(paper: Paper, notebooks: Path, name: str, size: float | None) -> Tria
         return Trial(name, size, **json.loads(answer.read_text(encoding="utf-8")))
 
 
-def run_cells(notebooks: Sequence[Path], apply: str, size: float | None) -> dict:
-    """Run the code cells of notebooks in this process, one by one, after the change `apply`.
+def run_cells(notebook: Path, apply: str, size: float | None) -> dict:
+    """Run the code cells of `notebook` in this process after the change `apply`.
 
     Statements run one by one, so that one that fails under the change takes no other with it.
     """
@@ -146,20 +146,18 @@ def run_cells(notebooks: Sequence[Path], apply: str, size: float | None) -> dict
 
     exec(apply, {"size": size})
     warnings.simplefilter("ignore")  # a changed loop may well overflow
-    rows, troubles = [], []
-    for notebook in notebooks:
-        space = {"__name__": "__main__", "display": lambda *_: None}
-        for cell in nbformat.read(notebook, as_version=4).cells:
-            if cell.cell_type != "code" or SKIP in cell.metadata.get("tags", ()):
-                continue
-            for statement in ast.parse(cell.source).body:
-                try:
-                    exec(compile(ast.Module([statement], []), cell.id, "exec"), space)
-                except (Exception, SystemExit) as error:
-                    troubles.append(f"{cell.id}: {type(error).__name__}: {error}")
-                    _forget(statement, space)
-            plt.close("all")
-        rows += [r for item in space.values() if isinstance(item, Ledger) for r in item.rows()]
+    space, troubles = {"__name__": "__main__", "display": lambda *_: None}, []
+    for cell in nbformat.read(notebook, as_version=4).cells:
+        if cell.cell_type != "code" or SKIP in cell.metadata.get("tags", ()):
+            continue
+        for statement in ast.parse(cell.source).body:
+            try:
+                exec(compile(ast.Module([statement], []), cell.id, "exec"), space)
+            except (Exception, SystemExit) as error:
+                troubles.append(f"{cell.id}: {type(error).__name__}: {error}")
+                _forget(statement, space)
+        plt.close("all")
+    rows = [r for item in space.values() if isinstance(item, Ledger) for r in item.rows()]
     return {
         "verdicts": {row["id"]: row["verdict"] for row in rows},
         "computed": {row["id"]: row["computed"] for row in rows},
@@ -300,5 +298,5 @@ def store(paper: Paper, found: Mapping[str, Mapping]) -> Path:
 
 if __name__ == "__main__":
     job = json.load(sys.stdin)
-    said = run_cells(list(map(Path, job["notebooks"])), job["apply"], job["size"])
+    said = run_cells(Path(job["notebook"]), job["apply"], job["size"])
     Path(job["answer"]).write_text(json.dumps(said), encoding="utf-8")

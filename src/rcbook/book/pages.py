@@ -104,8 +104,7 @@ def chapters(papers: Sequence[ledger.Paper]) -> str:
 def ledger_page(papers: Sequence[ledger.Paper], rows: Sequence[Mapping]) -> str:
     """Every claim with its verdict; one anchor per claim id, and a filter where scripts run."""
     by_key = {paper.key: paper for paper in papers}
-    head = "".join(f'<th role="columnheader" scope="col">{c}</th>' for c in _COLUMNS)
-    body = "\n".join(_ledger_row(row, by_key[row["paper"]]) for row in rows)
+    claims = [_ledger_row(row, by_key[row["paper"]]) for row in rows]
     return (
         "---\nhtml_theme.sidebar_secondary.remove: true\n---\n\n(ledger)=\n# Ledger\n\n"
         f"All {len(rows)} claims of this edition: what is printed, what we compute, and the "
@@ -120,9 +119,7 @@ def ledger_page(papers: Sequence[ledger.Paper], rows: Sequence[Mapping]) -> str:
         "flips, and how large the change may be before it does.\n\n"
         + _raw(
             f"{_filter(papers)}\n"
-            '<table class="rcbook-ledger rcbook-cards rcbook-full" role="table" '
-            f'aria-label="Claims"><thead role="rowgroup"><tr role="row">{head}</tr></thead>'
-            f'<tbody role="rowgroup">\n{body}\n</tbody></table>'
+            + show.cards(_COLUMNS, claims, "rcbook-ledger rcbook-full", "Claims")
         )
         + "\n"
         + words_table()
@@ -170,11 +167,11 @@ def _filter(papers: Sequence[ledger.Paper]) -> str:
     )
 
 
-def _ledger_row(row: Mapping, paper: ledger.Paper) -> str:
+def _ledger_row(row: Mapping, paper: ledger.Paper) -> tuple[str, Sequence[str]]:
     id = html.escape(row["id"])
     claim = (
         f"{show.math(row['says'])}<br><small>{show.math(row['where'])} · "
-        f'<a href="{_page(row["notebook"])}#{show.anchor_of(row["id"])}">'
+        f'<a href="{_chapter(paper)}#{show.anchor_of(row["id"])}">'
         f"{show.math(_short(paper))}</a> · "
         f'<a href="#{id}"><code>{id}</code></a></small>'
     )
@@ -186,13 +183,11 @@ def _ledger_row(row: Mapping, paper: ledger.Paper) -> str:
         _verdict(row, paper),
         show.math(row["reason"]),
     )
-    labelled = zip(_COLUMNS, cells, strict=True)
-    tds = "".join(f'<td role="cell" data-label="{name}">{cell}</td>' for name, cell in labelled)
-    return (
-        f'<tr role="row" id="{id}" data-paper="{html.escape(row["paper"])}" '
-        f'data-role="{" ".join(roles(row))}" '
-        f'data-verdict="{html.escape(row["verdict"])}">{tds}</tr>'
+    data = (
+        f' id="{id}" data-paper="{html.escape(row["paper"])}" data-role="{" ".join(roles(row))}" '
+        f'data-verdict="{html.escape(row["verdict"])}"'
     )
+    return data, cells
 
 
 def _tolerance(row: Mapping) -> str:
@@ -296,11 +291,7 @@ def api_page() -> str:
 
 
 def _chapter(paper: ledger.Paper) -> str:
-    return _page(paper.notebook)
-
-
-def _page(notebook: str) -> str:
-    return f"notebooks/{PurePosixPath(notebook).stem}.html"
+    return f"notebooks/{PurePosixPath(paper.notebook).stem}.html"
 
 
 def _short(paper: ledger.Paper) -> str:

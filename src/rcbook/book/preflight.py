@@ -36,12 +36,11 @@ def _of_paper(project: Project, paper: Paper) -> Iterable[str]:
     twins = [p.key for p in project.papers if p.chapter == paper.chapter and p is not paper]
     if twins:
         yield f"{file}: chapter {paper.chapter} is also that of {twins[0]}; give it another number"
-    absent = [name for name in paper.notebooks if not (project.notebooks / name).is_file()]
-    for name in absent:
-        yield f"{file}: its notebook {name} is not in notebooks/; put it there"
-    if paper.notebook in absent:
+    path = project.notebooks / paper.notebook
+    if not path.is_file():
+        yield f"{file}: its notebook {paper.notebook} is not in notebooks/; put it there"
         return
-    cells = _cells(project.notebooks / paper.notebook)
+    cells = _cells(path)
     first = cells[0].source.splitlines()[0] if cells and cells[0].source else ""
     if first != f"# {paper.title}":
         yield f"{paper.notebook}: its first line is {first!r}; make it '# {paper.title}', the title"

@@ -70,15 +70,14 @@ def _mark_stale(project: Project) -> None:
 
 
 def check_paper(project: Project, paper: ledger.Paper, limit: float = LIMIT) -> Run:
-    """Execute the notebooks of one paper and say what came out; the ledger file stays as it is.
+    """Execute the notebook of one paper and say what came out; the ledger file stays as it is.
 
-    Raises ValueError when one of them is not there.
+    Raises ValueError when its notebook is not there.
     """
-    paths = [project.notebooks / name for name in paper.notebooks]
-    for path in paths:
-        if not path.is_file():
-            raise ValueError(f"{paper.key}.toml: its notebook {path} is not there; put it there")
-    run = judge([paper], *execute(paths, limit))
+    path = project.notebooks / paper.notebook
+    if not path.is_file():
+        raise ValueError(f"{paper.key}.toml: its notebook {path} is not there; put it there")
+    run = judge([paper], *execute([path], limit))
     for row in run.rows:
         print(show.line(row))
     report(run)

@@ -17,6 +17,7 @@ from rcbook.loops import learning, memory, periodic
 from rcbook.loops.learning import Scheme
 from rcbook.loops.periodic import PeriodicLoop, PeriodicPlant
 from rcbook.loops.repetitive import Loop, RepetitiveController
+from rcbook.loops.verdict import MARGIN
 from rcbook.zdomain import Plant
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ class Result:
     """A contender as the rule tunes it: its response, and what it forgives."""
 
     tuned: Tuned
-    response: Response
+    response: Response | None  # None where no gain holds the noise budget
     gain_margin: float
 
 
@@ -73,10 +74,8 @@ def harmonics_within(period: float, delay: float) -> list[int]:
 
 def in_time(plant: Plant, period: int, budget: Budget) -> Mapping[str, Result]:
     """The feedback controllers on a constant plant, all corrections of the reference; tuned."""
-    inverse, chosen = (
-        zdomain.zero_phase_inverse(plant),
-        harmonics_within(period, budget.delay_margin),
-    )
+    inverse = zdomain.zero_phase_inverse(plant)
+    chosen = harmonics_within(period, budget.delay_margin)
 
     def repetitive(kept, gain):
         return RepetitiveController(inverse, kept, gain)
@@ -88,9 +87,12 @@ def in_time(plant: Plant, period: int, budget: Budget) -> Mapping[str, Result]:
         "PI": (lambda g, w: rivals.proportional_integral(period, g, w), True),
         "disturbance observer": (
             lambda g, w: rivals.disturbance_observer(plant, period, max(1 - g, 0.0)),
-            0,
+            False,
         ),
-        "peak filter": (lambda g, w: rivals.peak_filter(plant, period, chosen[1:], g, DAMPING), 0),
+        "peak filter": (
+            lambda g, w: rivals.peak_filter(plant, period, chosen[1:], g, DAMPING),
+            False,
+        ),
         "resonators": (lambda g, w: memory.resonators(plant, period, chosen, g), False),
         "prototype": (lambda g, w: repetitive(memory.plain(period), g), False),
         "filtered": (lambda g, w: repetitive(filtered(w), g), True),
@@ -105,7 +107,7 @@ def of_loop(plant: Plant, make: Callable, has_width: bool, budget: Budget) -> Re
     def loop(gain: float, width: float) -> Loop:
         return Loop(plant, make(gain, width), "plug-in")
 
-    tuned = tune(loop, margins.noise_gain, margins.delay_margin, budget, bool(has_width))
+    tuned = tune(loop, margins.noise_gain, margins.delay_margin, budget, has_width)
     if tuned.loop is None:
         return Result(tuned, None, np.nan)
     return Result(tuned, measures.in_time(tuned.loop), margins.gain_margin(tuned.loop))
@@ -126,7 +128,7 @@ def of_passes(plant: Plant, period: int, budget: Budget) -> Mapping[str, Result]
         return Scheme(plant, replace(law, q=smoothing(width)), period)
 
     def noise_gain(scheme):
-        stable = learning.spectral_radius(scheme) < 1 - 1e-9
+        stable = learning.spectral_radius(scheme) < 1 - MARGIN
         return learning.noise_gain(scheme) if stable else np.inf
 
     found = {}
@@ -134,10 +136,13 @@ def of_passes(plant: Plant, period: int, budget: Budget) -> Mapping[str, Result]
         tuned = tune(make, noise_gain, margins.pass_delay_margin, budget, has_width=True)
         margin = margins.pass_gain_margin(tuned.loop)
         found[name] = Result(tuned, measures.of_passes(tuned.loop), margin)
-    forward = learning.zero_phase_law(plant).filter
     alone = uncontrolled(plant)
-    answer = lambda u: u - alone.settled(u, 0 * u)[0]  # noqa: E731
-    return found | {"ZPETC": Result(UNTUNED, measures.feedforward(answer, forward), np.inf)}
+
+    def answer(command):
+        return command - alone.settled(command, 0 * command)[0]
+
+    response = measures.feedforward(answer, learning.zero_phase_law(plant).filter)
+    return found | {"ZPETC": Result(UNTUNED, response, np.inf)}
 
 
 UNTUNED = Tuned(None, np.nan, np.nan, 0.0, np.inf, "nothing")
@@ -163,12 +168,15 @@ def at_angles(
         "PI": (lambda g, w: rivals.proportional_integral(period, g, w), True),
         "disturbance observer": (
             lambda g, w: rivals.disturbance_observer(model, period, max(1 - g, 0.0)),
-            0,
+            False,
         ),
-        "peak filter": (lambda g, w: rivals.peak_filter(model, period, chosen[1:], g, DAMPING), 0),
+        "peak filter": (
+            lambda g, w: rivals.peak_filter(model, period, chosen[1:], g, DAMPING),
+            False,
+        ),
         "resonators": (
             lambda g, w: rivals.as_feedback(memory.resonators(model, period, chosen, g)),
-            0,
+            False,
         ),
         "prototype": (repetitive(constant, lambda w: [1.0]), False),
         "filtered": (repetitive(constant, smoothing), True),
@@ -192,7 +200,7 @@ def _at_angles(plant_late: Callable, make: Callable, has_width: bool, budget: Bu
 
     def noise_gain(loop: Any) -> float:
         if isinstance(loop, PeriodicLoop):
-            return periodic.noise_gain(loop) if radius(loop, 0.0) < 1 - 1e-9 else np.inf
+            return periodic.noise_gain(loop) if radius(loop, 0.0) < 1 - MARGIN else np.inf
         return varying.noise_gain(varying.closed(plant_late(0.0), loop, "noise"))
 
     def holds(loop: Any) -> float:
@@ -200,7 +208,7 @@ def _at_angles(plant_late: Callable, make: Callable, has_width: bool, budget: Bu
         late = budget.delay_margin * np.array([0.0, 0.5, 1.0])
         return np.inf if all(radius(loop, d) < 1 for d in late) else 0.0
 
-    tuned = tune(make, noise_gain, holds, budget, bool(has_width))
+    tuned = tune(make, noise_gain, holds, budget, has_width)
     if tuned.loop is None:
         return Result(tuned, None, np.nan)
     late = np.arange(0.0, LATEST + 0.1, 0.5)
@@ -208,6 +216,6 @@ def _at_angles(plant_late: Callable, make: Callable, has_width: bool, budget: Bu
     tuned = replace(tuned, delay_margin=margin)
     factors = np.geomspace(1.0, STRONGEST, 60)
     margin = zdomain.first_crossing(lambda f: radius(tuned.loop, 0.0, f) - 1, factors)
-    at = measures.at_angles if isinstance(tuned.loop, PeriodicLoop) else None
-    response = at(tuned.loop) if at else measures.at_nominal(plant_late(0.0), tuned.loop)
-    return Result(tuned, response, margin)
+    if isinstance(tuned.loop, PeriodicLoop):
+        return Result(tuned, measures.at_angles(tuned.loop), margin)
+    return Result(tuned, measures.at_nominal(plant_late(0.0), tuned.loop), margin)

@@ -1,8 +1,8 @@
 """How much later, stronger or longer things may be before a loop is lost.
 
-A loop d + n = 0 with n/d its open loop is stable up to the first extra delay, or factor, at which
-n/d meets -1.  Where a crossing lies on the unit circle is found on a grid and bisected; the grid
-is fine near the poles of the controller, which are near the circle.
+A loop d + n = 0 with n/d its open loop is stable up to the first extra delay at which n/d meets -1.
+Where |n/d| crosses one is found on a grid that is fine near the poles of the controller, which are
+near the circle.
 """
 
 from __future__ import annotations
@@ -10,24 +10,22 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy.optimize.elementwise import find_root
 
 from rcbook import zdomain
+from rcbook.loops import repetitive
 from rcbook.loops.learning import Scheme
-from rcbook.loops.repetitive import Loop, transfer
+from rcbook.loops.repetitive import Loop
+from rcbook.loops.verdict import MARGIN
 
 _FINE = 64  # points of the half circle for each power of the open loop
 
 
 def _crossings(function: Callable[[np.ndarray], np.ndarray], at: np.ndarray) -> np.ndarray:
-    """Angles at which a function of the angle changes its sign, bisected to rounding."""
+    """Angles at which a function of the angle changes its sign between neighbours of a grid."""
     sign = np.sign(function(at))
     turns = np.flatnonzero(sign[1:] * sign[:-1] < 0)
-    low, high, left = at[turns], at[turns + 1], sign[turns]
-    for _ in range(45):
-        middle = (low + high) / 2
-        same = np.sign(function(middle)) == left
-        low, high = np.where(same, middle, low), np.where(same, high, middle)
-    return (low + high) / 2
+    return find_root(function, (at[turns], at[turns + 1])).x
 
 
 def _angles(loop: Loop) -> np.ndarray:
@@ -41,23 +39,14 @@ def _angles(loop: Loop) -> np.ndarray:
     return np.unique(np.concatenate([even, close[(close > 0) & (close <= np.pi)]]))
 
 
-def _open(loop: Loop, angle: np.ndarray) -> np.ndarray:
-    d, n = loop.open_polynomials
-    z = np.exp(1j * angle)
-    return zdomain.evaluate(n, z) / zdomain.evaluate(d, z)
-
-
 def is_stable(loop: Loop) -> bool:
-    """Whether all roots of a loop lie inside the unit circle by more than 1e-9."""
-    return bool(np.abs(loop.roots).max(initial=0.0) < 1 - 1e-9)
+    """Whether all roots of a loop lie inside the unit circle, by more than rounding."""
+    return bool(np.abs(loop.roots).max(initial=0.0) < 1 - MARGIN)
 
 
 def noise_gain(loop: Loop) -> float:
     """`repetitive.noise_gain` from sensor to output, infinite for a loop that is not stable."""
-    if not is_stable(loop):
-        return np.inf
-    largest = float(np.abs(loop.roots).max(initial=0.0))
-    return zdomain.rms_gain(*transfer(loop, "noise", "output"), largest)
+    return repetitive.noise_gain(loop) if is_stable(loop) else np.inf
 
 
 def delay_margin(loop: Loop) -> float:
@@ -69,32 +58,29 @@ def delay_margin(loop: Loop) -> float:
     """
     if not is_stable(loop):
         return 0.0
-    d, n = loop.open_polynomials
 
-    def excess(angle: np.ndarray) -> np.ndarray:
-        z = np.exp(1j * angle)
-        return np.abs(zdomain.evaluate(n, z)) - np.abs(zdomain.evaluate(d, z))
+    def parts(angle: np.ndarray) -> list[np.ndarray]:
+        return [zdomain.evaluate(p, np.exp(1j * angle)) for p in loop.open_polynomials]
 
-    at = _crossings(excess, _angles(loop))
-    phase = np.mod(np.angle(_open(loop, at)) + np.pi, 2 * np.pi)
+    def deficit(angle: np.ndarray) -> np.ndarray:
+        return np.subtract(*np.abs(parts(angle)))
+
+    at = _crossings(deficit, _angles(loop))
+    d, n = parts(at)
+    phase = np.mod(np.angle(n / d) + np.pi, 2 * np.pi)
     return float((phase / at).min(initial=np.inf))
 
 
-def gain_margin(loop: Loop) -> float:
-    """Factor by which the open loop may grow before the loop is lost; infinite if by any.
+def gain_margin(loop: Loop, strongest: float = 100.0) -> float:
+    """Factor by which the open loop may grow before the loop is lost; infinite beyond `strongest`.
 
-    0 for a loop that is not stable.
+    The end of the stable gains around that of the loop; 0 for a loop that is not stable.
     """
-    if not is_stable(loop):
-        return 0.0
-    angles = _angles(loop)
-    at = np.append(_crossings(lambda a: _open(loop, a).imag, angles), [0.0, np.pi])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        value = _open(loop, at)
-    # Between neighbours of the grid the sign of the imaginary part also changes at a pole.
-    real = np.isfinite(value) & (np.abs(value.imag) < 1e-6 * np.abs(value))
-    factors = -1 / value[real].real
-    return float(factors[factors > 1].min(initial=np.inf))
+    gain = loop.require_controller().gain
+    for low, high in repetitive.stable_gains(loop, strongest * gain):
+        if low < gain < high:
+            return high / gain if high < strongest * gain else np.inf
+    return 0.0
 
 
 def pass_delay_margin(scheme: Scheme) -> float:

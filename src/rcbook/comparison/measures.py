@@ -203,7 +203,7 @@ def quantised(loop: Loop, reference: np.ndarray, step: float, **inputs: np.ndarr
     step = zdomain.real_number(step, "step", positive=True)
     free = repetitive.respond(loop, reference, **inputs).output
     top, bottom = repetitive.transfer(loop, "noise", "output")
-    output, noise, lags = free.copy(), np.zeros(free.size), max(top.size, bottom.size)
+    output, lags = free.copy(), max(top.size, bottom.size)
     top, bottom = (np.pad(p, (0, lags - p.size)) / bottom[0] for p in (top, bottom))
     extra, noise = np.zeros(free.size + lags), np.zeros(free.size + lags)
     for k in range(free.size):

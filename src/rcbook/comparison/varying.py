@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from rcbook.comparison.rivals import Feedback
 from rcbook.loops.periodic import PeriodicPlant
-from rcbook.loops.verdict import SOURCES
+from rcbook.loops.verdict import MARGIN, SOURCES
 from rcbook.signals import signal
 
 
@@ -127,7 +127,7 @@ def noise_gain(loop: PeriodicPlant) -> float:
     Root mean square over the period; infinite for a loop that is not stable.
     """
     radius = spectral_radius(loop)
-    if not radius < 1 - 1e-9:
+    if not radius < 1 - MARGIN:
         return np.inf
     covariance, powers = np.zeros((loop.order, loop.order)), []
     for _ in range(int(np.ceil(np.log(1e-12) / np.log(max(radius, 1e-12)))) + 2):

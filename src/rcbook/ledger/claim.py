@@ -69,7 +69,6 @@ class Claim:
     mended: str = ""  # `printed` after its erratum, where digits themselves are the misprint
     reason: str = ""  # format string over the evidence
     lost: str = ""  # what is lost that a computation would need, such as a figure
-    notebook: str = ""  # where it is judged, if not in the notebook of the paper
     parsed: Printed = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -112,15 +111,6 @@ class Paper:
     changes: Mapping[str, Mapping]  # of the model, which turn verdicts; see `falsify`
     claims: Mapping[str, Claim]
     margins: Mapping[str, Mapping] = field(default_factory=dict)  # as `falsify` measured them
-
-    @property
-    def notebooks(self) -> tuple[str, ...]:
-        """All notebooks that judge claims of the paper, its own first."""
-        return tuple(dict.fromkeys([self.notebook, *map(self.place, self.claims.values())]))
-
-    def place(self, claim: Claim) -> str:
-        """The notebook that judges a claim."""
-        return claim.notebook or self.notebook
 
 
 def parse(claim: Claim) -> Printed:

@@ -29,26 +29,16 @@ class Extract:
 
 @dataclass
 class Ledger:
-    """The claims of one paper and the judgements made so far, in the order of the paper.
-
-    `notebook` is the one whose claims are to be judged, if not the paper's own.
-    """
+    """The claims of one paper and the judgements made so far, in the order of the paper."""
 
     paper: Paper
     judgements: dict[str, Judgement] = field(default_factory=dict)
-    notebook: str = ""
     _fresh: list[str] = field(default_factory=list)
 
     @classmethod
-    def of(cls, key: str, notebook: str = "") -> Ledger:
-        """An empty ledger for the paper `key`, in its own notebook or another that it names.
-
-        Raises ValueError for a notebook in which no claim of the paper is judged.
-        """
-        paper = load(key)
-        if notebook and notebook not in paper.notebooks:
-            raise ValueError(f"{key}.toml has no claim with notebook = {notebook!r}; give it some")
-        return cls(paper, notebook=notebook)
+    def of(cls, key: str) -> Ledger:
+        """An empty ledger for the paper `key`."""
+        return cls(load(key))
 
     def check(self, id: str, value: object = None, corrected: object = None, **evidence):
         """Judge claim `id` (see `judge`), keep the judgement and return it.
@@ -79,10 +69,8 @@ class Ledger:
         return judgement.evidence[name]
 
     def missing(self) -> list[str]:
-        """Ids of the claims of this notebook that are not checked yet."""
-        claims, here = self.paper.claims.items(), self.notebook or self.paper.notebook
-        own = (id for id, claim in claims if self.paper.place(claim) == here)
-        return [id for id in own if id not in self.judgements]
+        """Ids of the claims not checked yet."""
+        return [id for id in self.paper.claims if id not in self.judgements]
 
     def rows(self) -> list[dict]:
         """The judged claims as the list of objects that the ledger file holds."""
@@ -105,10 +93,10 @@ def summary(rows: Sequence[Mapping], page: str = "") -> str:
     """Counts of `rows` as HTML and, folded, a table of those that are not simply reproduced."""
     plain = (REPRODUCED, REPRODUCED)
     rest = [row for row in rows if (row["verdict"], row["expected_verdict"]) != plain]
-    flips = sum(row["verdict"] != row["expected_verdict"] for row in rows)
+    flips = any(row["verdict"] != row["expected_verdict"] for row in rows)
     found = f"<p>{show.counts(rows)}.</p>"
     if rest:
-        found += show.details("All but the reproduced ones", show.table(rest, page=page), flips > 0)
+        found += show.details("All but the reproduced ones", show.table(rest, page=page), flips)
     return found
 
 
@@ -129,7 +117,7 @@ def _row(paper: Paper, judgement: Judgement) -> dict:
         "convention": paper.conventions[claim.convention]["text"],
         "reason": judgement.reason,
         "erratum": claim.erratum,
-        "notebook": paper.place(claim),
+        "notebook": paper.notebook,
         "kind": claim.kind,
         "reading": claim.convention,
         "evidence": _finite(dict(judgement.evidence)),

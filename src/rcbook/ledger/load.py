@@ -75,9 +75,8 @@ def _check_types(key: str, data: Mapping) -> None:
             raise ValueError(f"{key}.toml: {name} = {data[name]!r} is no {kind.__name__}; mend it")
     if data["chapter"] < 1 or not data["title"].strip():
         raise ValueError(f"{key}.toml: give a title and a chapter of 1 or more")
-    for name in (data["notebook"], *(c["notebook"] for c in data["claims"] if "notebook" in c)):
-        if not str(name).endswith(".ipynb") or {"/", "\\"} & {*str(name)}:
-            raise ValueError(f"{key}.toml: notebook {name!r}; give the name of a notebook")
+    if not data["notebook"].endswith(".ipynb") or {"/", "\\"} & {*data["notebook"]}:
+        raise ValueError(f"{key}.toml: notebook {data['notebook']!r}; give the name of a notebook")
     for entry in data["claims"]:
         if not isinstance(entry, dict):
             raise ValueError(f"{key}.toml: claim {entry!r} is no table; write [[claims]]")

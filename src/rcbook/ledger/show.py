@@ -110,36 +110,40 @@ def table(
     Ids are links where `page` says which page has the whole ledger; with `anchors` each row can be
     led to.
     """
-    heads = ["Claim", "Printed", "Ours", "Verdict"] + ["Reason"] * reasons
-    head = "".join(f'<th role="columnheader" scope="col">{h}</th>' for h in heads)
-    body = "".join(_row(row, heads, page, anchors) for row in rows)
+    heads = ("Claim", "Printed", "Ours", "Verdict", "Reason")[: 4 + reasons]
+    return cards(heads, [_row(row, page, anchors) for row in rows], "rcbook-ledger", "Claims")
+
+
+def cards(
+    heads: Sequence[str], rows: Iterable[tuple[str, Sequence[str]]], kind: str, label: str
+) -> str:
+    """An HTML table of class `kind` whose rows, attributes and cells, are cards on a phone.
+
+    Cells beyond the heads are left out.  What looks like no table any more keeps the roles of one.
+    """
+    head = "".join(f'<th role="columnheader" scope="col">{name}</th>' for name in heads)
+    body = []
+    for attributes, cells in rows:
+        pairs = zip(heads, cells, strict=False)
+        tds = "".join(f'<td role="cell" data-label="{name}">{cell}</td>' for name, cell in pairs)
+        body.append(f'<tr role="row"{attributes}>{tds}</tr>')
     return (
-        '<table class="rcbook-ledger rcbook-cards" role="table" aria-label="Claims">'
-        f'<thead role="rowgroup"><tr role="row">{head}</tr></thead>'
-        f'<tbody role="rowgroup">{body}</tbody></table>'
+        f'<table class="{kind} rcbook-cards" role="table" aria-label="{html.escape(label)}">'
+        f'<thead role="rowgroup"><tr role="row">{head}</tr></thead>\n'
+        f'<tbody role="rowgroup">\n{chr(10).join(body)}\n</tbody></table>'
     )
 
 
-def _row(row: Mapping, heads: Sequence[str], page: str, anchors: bool) -> str:
+def _row(row: Mapping, page: str, anchors: bool) -> tuple[str, Sequence[str]]:
     e = html.escape
     id = f"<code>{e(row['id'])}</code>"
     if page:
         id = f'<a href="{page}#{e(row["id"])}">{id}</a>'
     claim = f"{math(row['says'])}<br><small>{math(row['where'])} · {id}</small>"
-    cells = (
-        claim,
-        math(printed(row)),
-        e(value(row["computed"])),
-        verdict(row),
-        math(row["reason"]),
-    )
-    labelled = zip(heads, cells, strict=False)
-    tds = "".join(f'<td role="cell" data-label="{name}">{cell}</td>' for name, cell in labelled)
+    ours = e(value(row["computed"]))
     anchor = f' id="{anchor_of(row["id"])}"' if anchors else ""
-    return (
-        f'<tr role="row"{anchor} data-verdict="{e(row["verdict"])}" '
-        f'data-paper="{e(row["paper"])}">{tds}</tr>'
-    )
+    data = f'{anchor} data-verdict="{e(row["verdict"])}" data-paper="{e(row["paper"])}"'
+    return data, (claim, math(printed(row)), ours, verdict(row), math(row["reason"]))
 
 
 def anchor_of(id: str) -> str:

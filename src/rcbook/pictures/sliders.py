@@ -90,8 +90,8 @@ def with_sliders(
     axes = {"xlabel": xlabel, "ylabel": ylabel, "xlim": xlim, "ylim": ylim, "yscale": yscale}
     plot = SliderPlot(sliders, tuple(start), frames, axes)
     labels = list(plot.at(*start).curves)
-    for setting in product(*sliders.values()):
-        if (found := list(plot.at(*setting).curves)) != labels:
+    for setting, each in zip(product(*sliders.values()), frames, strict=True):
+        if (found := list(each.curves)) != labels:
             raise ValueError(
                 f"at {setting} the curves are {', '.join(found)}, not {', '.join(labels)}; "
                 "draw the same ones at every setting"

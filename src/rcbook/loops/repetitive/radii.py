@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rcbook.loops.memory import RepetitiveController
-from rcbook.loops.repetitive.crossings import crossings, outside
 from rcbook.loops.repetitive.loop import Loop
 from rcbook.signals import signal
 from rcbook.zdomain import evaluate, multiply, sorted_roots
+from rcbook.zdomain.crossings import crossings, outside
 
 SHORT = 60  # coefficients: all roots of as many are as quick
 _TOGETHER = 4096  # roots: what they need stays in the cache

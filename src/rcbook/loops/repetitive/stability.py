@@ -12,11 +12,11 @@ from rcbook import zdomain
 from rcbook.loops import memory
 from rcbook.loops import verdict as judging
 from rcbook.loops.memory import RepetitiveController, Resonators
-from rcbook.loops.repetitive.crossings import crossings, outside
 from rcbook.loops.repetitive.loop import Loop, Process, as_loop, characteristic_polynomial
 from rcbook.loops.repetitive.radii import SHORT, spectral_radii
 from rcbook.loops.verdict import MARGIN, Verdict
 from rcbook.zdomain import Plant, multiply
+from rcbook.zdomain.crossings import crossings, outside
 
 Gains = list[tuple[float, float]]
 

@@ -18,9 +18,7 @@ class Cut(NamedTuple):
 
     op: Arithmetic
     sines: list  # [step of the turn][tooth or all] at its start, in its middle and at its end
-    begins: (
-        list  # [step of the turn][tooth or all] half step from which a tooth cuts there, if ever
-    )
+    begins: list  # [step of the turn][tooth or all] half step from which a tooth cuts, if ever
     runout: list  # [tooth or all], m
     feed_speed: float  # m/s
     pitch: float  # rad
