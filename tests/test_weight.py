@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from rcbook.book import icons, render
+from rcbook.book import chapter, icons, render
 
 BOUND = 3_000_000  # bytes
 MATHJAX = "tex-svg-full.js"
@@ -26,14 +26,14 @@ def shown(lines: str, pixels: bytes) -> dict:
     data = {"image/svg+xml": lines, "image/png": base64.b64encode(pixels).decode()}
     output = nbformat.v4.new_output("display_data", data)
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(outputs=[output])])
-    return render.shown(notebook).cells[0].outputs[0]["data"]
+    return chapter.shown(notebook).cells[0].outputs[0]["data"]
 
 
 NOISE = png(np.random.default_rng(1).integers(0, 255, (60, 80, 3), dtype=np.uint8))
 
 
 def test_a_figure_is_shown_as_lines_unless_they_are_too_heavy():
-    bound = int(render.HEAVIER * len(render.palette(NOISE)))
+    bound = int(chapter.HEAVIER * len(chapter.palette(NOISE)))
     assert set(shown("x" * bound, NOISE)) == {"image/svg+xml"}
     assert set(shown("x" * (bound + 1), NOISE)) == {"image/png"}
 
@@ -44,14 +44,14 @@ def test_a_palette_is_lighter_and_moves_no_pixel_far():
         [np.tile(tone, (100, 1)), np.full((100, 200), 40), np.tile(tone[::-1], (100, 1))]
     )
     before = np.moveaxis(before, 0, -1).astype(np.uint8)
-    packed = render.palette(png(before))
+    packed = chapter.palette(png(before))
     after = np.asarray(Image.open(io.BytesIO(packed)).convert("RGB"))
     assert np.abs(after.astype(int) - before).max() <= 4
-    assert len(render.palette(NOISE)) < 0.5 * len(NOISE)
+    assert len(chapter.palette(NOISE)) < 0.5 * len(NOISE)
 
 
 def test_what_is_transparent_lies_on_white():
-    clear = render.palette(png(np.zeros((4, 4, 4), np.uint8)))
+    clear = chapter.palette(png(np.zeros((4, 4, 4), np.uint8)))
     assert Image.open(io.BytesIO(clear)).convert("RGB").getpixel((1, 1)) == (255, 255, 255)
 
 

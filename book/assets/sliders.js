@@ -25,7 +25,7 @@
     const inputs = [...picture.querySelectorAll("input")];
     const output = picture.querySelector(".rcbook-note");
     picture.hidden = false; // it needs a width to be drawn in
-    picture.closest(".cell_output").classList.add("rcbook-moves");
+    picture.closest("figure").classList.add("rcbook-moves");
     await Bokeh.embed.embed_item(item, picture.querySelector(".rcbook-chart"));
     const chart = Bokeh.documents.find((one) => one.get_model_by_id(item.root_id));
 
@@ -58,7 +58,10 @@
     },
     { rootMargin: "800px" },
   );
+  // It comes to stand between the still picture, which is in the cell before, and its caption.
   for (const picture of document.querySelectorAll(".rcbook-sliders")) {
-    near.observe(picture.closest(".cell_output"));
+    const figure = picture.closest(".cell").previousElementSibling.querySelector("figure");
+    figure.querySelector("figcaption").before(picture);
+    near.observe(figure);
   }
 }

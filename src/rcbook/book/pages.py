@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import html
-import pkgutil
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePosixPath
 from urllib.parse import urlencode
 
-import rcbook
 from rcbook import ledger
+from rcbook.book import links
 from rcbook.ledger import show
 
-_MACHINERY = ("rcbook.book", "rcbook.cli")
 _COLUMNS = ("Claim", "Printed", "Ours", "Tolerance", "Verdict", "Reason")
 
 
@@ -280,12 +278,10 @@ def _deciding(row: Mapping) -> str:
 
 def api_page() -> str:
     """One section per module of the package, from its docstrings."""
-    found = pkgutil.walk_packages(rcbook.__path__, "rcbook.")
-    names = [m.name for m in found if not m.ispkg and not m.name.startswith(_MACHINERY)]
     sections = (
         f"## {name}\n\n```{{eval-rst}}\n.. automodule:: {name}\n"
         "   :members:\n   :member-order: bysource\n```\n"
-        for name in names
+        for name in links.modules()
     )
     return "(api)=\n# API reference\n\nGenerated from the docstrings.\n\n" + "\n".join(sections)
 

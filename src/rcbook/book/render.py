@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import base64
-import io
-import re
 import shutil
 import subprocess
 import sys
@@ -14,21 +12,13 @@ from importlib import metadata
 from pathlib import Path
 
 import nbformat
-from PIL import Image
 
-from rcbook import ledger
-from rcbook.book import cost, house, icons, pages, sliders
+from rcbook.book import chapter, cost, house, icons, links, pages
 from rcbook.book.execute import alternative, plain
 from rcbook.book.project import Project, read_text
 from rcbook.book.run import Run
-from rcbook.ledger import show
 from rcbook.ledger.marks import without_marks
-from rcbook.pictures.sliders import MIME as SLIDERS
 
-LEDGER = "../ledger.html"  # as a chapter sees it
-_CORNER = re.compile(r"<th[^>]*>(?:&nbsp;)?</th>")
-_WORDS_A_MINUTE = 200  # of a text with formulas
-HEAVIER = 2.5  # so many times the weight of its pixels a figure may have as lines
 TAIL = 60  # lines of Sphinx's output shown when it fails
 _JUPYTER_BOOK = "from jupyter_book.cli.main import main; main()"  # it has no __main__
 _OPTIONS = ("-W", "-n", "--keep-going", "-q")
@@ -64,8 +54,10 @@ def fill(stage: Path, project: Project, run: Run) -> None:
     shutil.copy(mathjax(), stage / "assets")
     shutil.copy(bokeh(), stage / "assets")
     (stage / "notebooks").mkdir()
+    terms = links.terms(read_text(project.book / "glossary.md"))
+    functions = links.functions()
     for name, notebook in run.notebooks.items():
-        text = nbformat.writes(shown(notebook))
+        text = nbformat.writes(chapter.shown(notebook, name, terms, functions))
         (stage / "notebooks" / name).write_text(text, encoding="utf-8")
     written = {page.name: read_text(page) for page in project.book.glob("*.md")}
     made = pages.pages(project.papers, run.rows)
@@ -91,73 +83,6 @@ def cover(
                     if png := output.get("data", {}).get("image/png"):
                         return name, cell, base64.b64decode(png)
     raise RenderError("the book has no cover: tag a code cell that shows one PNG with `cover`")
-
-
-def shown(notebook: nbformat.NotebookNode) -> nbformat.NotebookNode:
-    """A copy of `notebook` for the renderer: no marks of numbers, how long it takes to read, and
-    ids in its ledgers link to the ledger page."""
-    notebook = nbformat.from_dict(notebook)
-    notebook.cells[0].source += f"\n\n{reading_time(notebook)}\n"
-    for cell in notebook.cells:
-        if cell.cell_type == "markdown":
-            cell.source = without_marks(cell.source)
-        elif alternative(cell):
-            cell.metadata["mystnb"]["image"]["alt"] = without_marks(alternative(cell))
-        for output in cell.get("outputs", ()):
-            _link(output.get("data", {}))
-            _lighten(output.get("data", {}))
-        if cell.cell_type == "code":
-            cell.outputs += _moving(cell)
-    return notebook
-
-
-def reading_time(notebook: nbformat.NotebookNode) -> str:
-    """How long the text of a notebook takes to read, and how many pictures it has, in words."""
-    texts = (without_marks(c.source) for c in notebook.cells if c.cell_type == "markdown")
-    minutes = sum(len(text.split()) for text in texts) / _WORDS_A_MINUTE
-    pictures = sum(bool(alternative(cell)) for cell in notebook.cells)
-    return f"*{max(1, round(minutes))} minutes of reading, {pictures} pictures.*"
-
-
-def _link(data: dict) -> None:
-    """Show the ledger rows of an output anew, with links to the ledger page, and drop the rows,
-    of which the renderer would warn."""
-    if rows := data.pop(ledger.MIME, None):
-        data["text/html"] = ledger.summary(rows, page=LEDGER)
-    if rows := data.pop(ledger.SHOWN, None):
-        data["text/html"] = show.folded(rows, page=LEDGER)
-    if "text/html" in data:  # the empty corner of a table of pandas heads no column
-        data["text/html"] = _CORNER.sub("<td></td>", data["text/html"])
-
-
-def _lighten(data: dict) -> None:
-    """Leave a figure as lines, which are sharp on any screen, or where these are too heavy (maps,
-    clouds of points, long runs) as pixels of a palette."""
-    if "image/png" not in data:
-        return
-    packed = palette(base64.b64decode(data.pop("image/png")))
-    if not 0 < len(data.get("image/svg+xml", "")) <= HEAVIER * len(packed):
-        data.pop("image/svg+xml", None)
-        data["image/png"] = base64.b64encode(packed).decode()
-
-
-def palette(png: bytes) -> bytes:
-    """A PNG in the 256 colours that fit it best, with less than half of the weight."""
-    picture = Image.open(io.BytesIO(png)).convert("RGBA")
-    ground = Image.new("RGBA", picture.size, "white")
-    ground.alpha_composite(picture)
-    few = ground.convert("RGB").quantize(256, dither=Image.Dither.NONE)
-    packed = io.BytesIO()
-    few.save(packed, "png", optimize=True)
-    return packed.getvalue()
-
-
-def _moving(cell: nbformat.NotebookNode) -> list[nbformat.NotebookNode]:
-    """What moves the pictures with sliders of a cell, each to stand behind its still picture."""
-    found = (output.get("data", {}).pop(SLIDERS, None) for output in cell.outputs)
-    elements = [sliders.element(data, alternative(cell)) for data in found if data]
-    show_html = nbformat.v4.new_output
-    return [show_html("display_data", {"text/html": element}) for element in elements]
 
 
 def mathjax() -> Path:
