@@ -56,6 +56,29 @@ function letScroll() {
   }
 }
 
+// On a phone the rows of a table are cards, as our own tables are from the start; a table of Markdown
+// or of pandas learns the names of its columns here.
+function labelCells() {
+  for (const table of document.querySelectorAll("article table:not(.rcbook-cards)")) {
+    const heads = [...table.querySelectorAll("thead tr")];
+    const names = heads.length === 1 ? [...heads[0].cells].map((cell) => cell.textContent.trim()) : [];
+    const rows = [...table.querySelectorAll("tbody tr")];
+    if (!names.length || rows.some((row) => row.cells.length !== names.length)) continue;
+    table.classList.add("rcbook-cards");
+    table.setAttribute("role", "table");
+    for (const part of table.tHead ? [table.tHead, ...table.tBodies] : []) part.setAttribute("role", "rowgroup");
+    for (const row of [heads[0], ...rows]) row.setAttribute("role", "row");
+    for (const cell of heads[0].cells) cell.setAttribute("role", "columnheader");
+    for (const row of rows) {
+      [...row.cells].forEach((cell, i) => {
+        cell.setAttribute("role", cell.tagName === "TH" ? "rowheader" : "cell");
+        cell.dataset.label = names[i];
+      });
+    }
+  }
+}
+
+labelCells();
 startLedger();
 unfold();
 letScroll();

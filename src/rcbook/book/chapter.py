@@ -23,6 +23,8 @@ HEAVIER = 2.5  # so many times the weight of its pixels a figure may have as lin
 FOLDED = "hide-input"
 _WORDS_A_MINUTE = 200  # of a text with formulas
 _CORNER = re.compile(r"<th[^>]*>(?:&nbsp;)?</th>")
+_HEAD = re.compile(r"<th\b[^>]*>[^<]*</th>")
+_FORMULA, _TYPESET = re.compile(r"\$([^$<]+)\$"), r'<span class="math notranslate">\\(\1\\)</span>'
 _STYLED = re.compile(r'<style type="text/css">.*?</style>\s*| (?:id|class)="[^"]*"', re.DOTALL)
 _INDEX_NAMES = re.compile(
     r"<tr>\s*<th[^>]*>(?:&nbsp;)?</th>(.*?)</tr>\s*"  # the columns' names, below an empty corner
@@ -144,13 +146,14 @@ def _link(data: dict) -> None:
 def table(html: str) -> str:
     """The HTML of an output, its tables of pandas in the book's own style and with one head.
 
-    The names that pandas draws by chance go, the name of the index comes into the corner, and an
-    empty corner heads no column.
+    The names that pandas draws by chance go, the name of the index comes into the corner, an empty
+    corner heads no column, and formulas in its heads are marked for MathJax.
     """
     if 'id="T_' in html:
         html = _STYLED.sub("", html)
     html = _INDEX_NAMES.sub(r"<tr><th>\2</th>\1</tr>", html)
-    return _CORNER.sub("<td></td>", html)
+    html = _CORNER.sub("<td></td>", html)
+    return _HEAD.sub(lambda head: _FORMULA.sub(_TYPESET, head[0]), html)
 
 
 def _lighten(data: dict) -> None:

@@ -17,7 +17,7 @@ import rcbook
 # What has no words of the text in it: code, formulas, roles, links, tags, headings, targets.
 _CLOSED = re.compile(
     r"```.*?```|\$\$.+?\$\$|\$[^$]+\$|\{[\w:-]+\}`[^`]+`|`[^`\n]+`|\[[^\]]*\]\([^)]*\)|<[^>]+>|"
-    r"^#+ .*$|^\([\w-]+\)=$",
+    r"^#+ [^\n]*$|^\([\w-]+\)=$",
     re.DOTALL | re.MULTILINE,
 )
 _NUMBERED = re.compile(r"\[(figure|equation)\]\(#((?:fig|eq)-[\w-]+)\)", re.IGNORECASE)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import nbformat
 
-from rcbook.book import chapter, cost, house, icons, links, pages
+from rcbook.book import chapter, cost, house, icons, links, pages, rerun
 from rcbook.book.execute import alternative, plain
 from rcbook.book.project import Project, read_text
 from rcbook.book.run import Run
@@ -53,12 +53,16 @@ def fill(stage: Path, project: Project, run: Run) -> None:
     (stage / "cover.png").write_bytes(png)
     shutil.copy(mathjax(), stage / "assets")
     shutil.copy(bokeh(), stage / "assets")
-    (stage / "notebooks").mkdir()
+    for folder in ("notebooks", "downloads"):
+        (stage / folder).mkdir()
+    repository = rerun.repository(project.book)
     terms = links.terms(read_text(project.book / "glossary.md"))
     functions = links.functions()
     for name, notebook in run.notebooks.items():
-        text = nbformat.writes(chapter.shown(notebook, name, terms, functions))
-        (stage / "notebooks" / name).write_text(text, encoding="utf-8")
+        shown = chapter.shown(notebook, name, terms, functions)
+        shown.cells.append(nbformat.v4.new_markdown_cell(rerun.section(name, repository)))
+        (stage / "notebooks" / name).write_text(nbformat.writes(shown), encoding="utf-8")
+        shutil.copy(project.notebooks / name, stage / "downloads")
     written = {page.name: read_text(page) for page in project.book.glob("*.md")}
     made = pages.pages(project.papers, run.rows)
     made["cover.md"] = pages.cover(name, run.notebooks[name].cells[0].source, alternative(cell))
