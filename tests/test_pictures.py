@@ -340,8 +340,8 @@ def test_a_loop_with_a_signal_too_few_is_refused():
 # how many signs there are.
 ROUND = {
     pictures.draw_learning_loop: (
-        ["memory of\none pass", "$y_{m,L}$", "$G$", "$y_L$", "$y_r$"],
-        ["$e_L$", "$H$", "$y_{m,L+1}$"],
+        ["memory of\none pass", "$v_m$", "$G$", "$y_m$", "$r$"],
+        ["$e_m$", "$C$", "$v_{m+1}$"],
         ["+"] * 3 + ["−"],
     ),
     pictures.draw_spindle_drive: (
@@ -383,7 +383,7 @@ def test_the_position_is_subtracted_where_its_wire_enters():
     _, ax = rendered(pictures.draw_learning_loop)
     x, y, radius = minus(pictures.draw_learning_loop, "w")
     (wire,) = (w for w in layouts.wires(ax) if np.allclose(w[-1], (x - radius, y)))
-    assert wire[0, 0] < places(ax)["$y_L$"][0] < wire[-1, 0]
+    assert wire[0, 0] < places(ax)["$y_m$"][0] < wire[-1, 0]
 
 
 def test_the_output_of_the_periodic_loop_is_subtracted_on_the_left():

@@ -32,7 +32,7 @@ def draw_lathe_setup(ax: Axes, half_side: float = 10e-3) -> Axes:
     wires = [
         Wire("angle", "chuck"),  # without a head: they turn together
         Wire("angle", "computer", r"angle $\theta$"),
-        Wire("computer", "motor", "command $y_m$"),
+        Wire("computer", "motor", "command $v$"),
         Wire("position", "computer", "position $y$", via=0.25),
     ]
     add_blocks(sketch, items, wires)
@@ -58,7 +58,7 @@ def _draw_section(sketch: Sketch) -> None:
     sketch.turn(CENTRE, 0.78, (np.pi / 2, np.pi / 2 + TURNED), THIN)
     sketch.dot(CENTRE)
     x, y = CENTRE
-    sketch.words((r"$y_r(\theta)$", x + 0.72, y + 0.35), (r"$\theta$", x + 1.02, y - 0.29))
+    sketch.words((r"$r(\theta)$", x + 0.72, y + 0.35), (r"$\theta$", x + 1.02, y - 0.29))
     sketch.words(("$a$", x - 0.42, y + 0.58), ("workpiece", 5.75, 7.0, "left", (x + 1.3, y + 0.75)))
 
 
@@ -89,7 +89,7 @@ def _draw_graph(sketch: Sketch, half_side: float) -> None:
         sketch.write(word, left - 0.25, level, "right")
     sketch.line(np.column_stack([x, y])[:-1], BOLD)
     sketch.dot((x[-1], y[-1]), 0.1)
-    sketch.write(r"radius $y_r(\theta)$, one turn", (left + right) / 2, 8.1)
+    sketch.write(r"radius $r(\theta)$, one turn", (left + right) / 2, 8.1)
 
 
 def draw_section(

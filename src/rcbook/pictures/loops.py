@@ -57,16 +57,16 @@ def draw_learning_loop(ax: Axes) -> Axes:
         Node("command", (3.2, 0.0)),
         Block("plant", "$G$", (5.4, 0.0), PLANT),
         Sum("error", (8.0, 0.0), {"w": "−", "n": "+"}),
-        Block("law", "$H$", (5.4, -2.0), FOCUS),
+        Block("law", "$C$", (5.4, -2.0), FOCUS),
         Sum("corrected", (3.2, -2.0), {"n": "+", "e": "+"}),
     ]
     wires = [
-        *path("memory", "$y_{m,L}$", "command", "", "plant", "$y_L$", "error"),
-        Wire((8.0, 1.3), "error", "$y_r$"),
-        Wire("error", "law", "$e_L$", via=-2.0),
+        *path("memory", "$v_m$", "command", "", "plant", "$y_m$", "error"),
+        Wire((8.0, 1.3), "error", "$r$"),
+        Wire("error", "law", "$e_m$", via=-2.0),
         *path("law", "", "corrected"),
         Wire("command", "corrected"),
-        Wire("corrected", "memory", "$y_{m,L+1}$", via=-2.0),
+        Wire("corrected", "memory", "$v_{m+1}$", via=-2.0),
     ]
     return blocks.draw_block_diagram(ax, items, wires)
 
