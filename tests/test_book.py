@@ -59,8 +59,9 @@ def test_chapters_have_one_order_and_one_title_everywhere():
     papers = [ledger.load(key) for key in ledger.papers()]
     contents = yaml.safe_load((ROOT / "book" / "_toc.yml").read_text(encoding="utf-8"))
     listed = [chapter["file"] for part in contents["parts"] for chapter in part["chapters"]]
-    names = [f"notebooks/{paper.notebook.removesuffix('.ipynb')}" for paper in papers]
+    chapters = [chapter for paper in papers for chapter in paper.chapters]
+    names = [f"notebooks/{chapter.notebook.removesuffix('.ipynb')}" for chapter in chapters]
     assert [name for name in listed if name in names] == names
-    for paper in papers:
-        first = nbformat.read(ROOT / "notebooks" / paper.notebook, as_version=4).cells[0]
-        assert first.source.splitlines()[0] == f"# {paper.title}"
+    for chapter in chapters:
+        first = nbformat.read(ROOT / "notebooks" / chapter.notebook, as_version=4).cells[0]
+        assert first.source.splitlines()[0] == f"# {chapter.title}"

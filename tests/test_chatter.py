@@ -412,3 +412,47 @@ REFUSED = [
 def test_bad_input_is_refused_at_the_door(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+# ---- the average over the speeds ----
+
+
+def test_a_wave_grows_from_turn_to_turn_above_the_least_limit():
+    """|K| = |m s^2 + c s + k + K| first at the least limit, at w = wn sqrt(1 + 2 zeta), by hand."""
+    weakest = MODE.natural_frequency * np.sqrt(1 + 2 * MODE.damping_ratio)
+    factor = chatter.surface_factor(MODE, chatter.least_limit(MODE), weakest)
+    assert abs(factor) == pytest.approx(1, rel=1e-12)
+    near = weakest * np.array([0.99, 1.01])
+    assert np.all(np.abs(chatter.surface_factor(MODE, chatter.least_limit(MODE), near)) < 1)
+
+
+def test_the_average_at_constant_speed_is_the_least_limit():
+    cut = chatter.Cut(MODE, 1e6, 100.0, rva=[0.0, 1e-6])
+    assert chatter.averaged_limit(cut) == pytest.approx(chatter.least_limit(MODE), rel=1e-4)
+
+
+@pytest.mark.parametrize(("rva", "close"), [(0.1, 0.02), (0.2, 0.02), (0.3, 0.03)])
+def test_the_average_is_close_to_the_limit_where_speeds_average_out(rva, close):
+    """One period of the speed in 7.7 turns; against the multipliers, which know all phases."""
+    cut = replace(chatter.HANSON_TSAO2000, rva=rva, rvf=0.13)
+    exact = chatter.stability_limit(cut, precision=2e-3, per_cycle=8)
+    assert chatter.averaged_limit(cut) == pytest.approx(exact, rel=close)
+
+
+def test_the_average_is_that_of_an_integral():
+    """At the limit no number of waves has a mean log above zero, and one has zero: by quadrature
+    over the angle, where the law is one in angle and its speed is known in closed form."""
+    cut = replace(chatter.HANSON_TSAO2000, rva=0.25, law="angle")
+    limit = float(chatter.averaged_limit(cut))
+
+    def mean(wave):
+        def logarithm(angle):
+            s = 1j * wave * (1 + 0.25 * np.sin(angle))
+            return np.log(
+                abs(limit / (MODE.mass * s**2 + MODE.damping * s + MODE.stiffness + limit))
+            )
+
+        return scipy.integrate.quad(logarithm, 0, 2 * np.pi, epsabs=1e-9)[0] / (2 * np.pi)
+
+    waves = MODE.natural_frequency * np.linspace(0.8, 1.6, 81)
+    assert max(map(mean, waves)) == pytest.approx(0, abs=2e-3)

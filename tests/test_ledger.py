@@ -470,6 +470,51 @@ def test_a_value_and_its_evidence_can_be_asked_for(folder):
         book.value("paper.b", "late")
 
 
+# ---- further chapters ----
+
+
+FURTHER = """
+[[further]]
+notebook = "more.ipynb"
+title = "More"
+idea = { cite = "x", loop = "a 2<!-- chosen: to see --> loop", index = "time", period = "a turn" }
+"""
+
+
+def test_a_further_chapter_is_read_from_the_data_file(folder):
+    folder(GOOD + FURTHER)
+    (_, more) = ledger.load("paper").chapters
+    assert (more.notebook, more.title) == ("more.ipynb", "More")
+    assert more.idea["loop"] == "a 2 loop"
+    assert Ledger.of("paper", "more.ipynb").missing() == []
+    with pytest.raises(ValueError, match=r"no chapter 'less\.ipynb'; it has .*, more\.ipynb"):
+        Ledger.of("paper", "less.ipynb")
+
+
+@pytest.mark.parametrize(
+    ("spoiled", "said"),
+    [
+        (FURTHER.replace("[[further]]", "[further]"), "is no list"),
+        (FURTHER.replace('title = "More"', ""), "title is missing or unknown"),
+        (FURTHER.replace('"More"', '" "'), "give a title"),
+        (FURTHER + 'colour = "red"', "colour is missing or unknown"),
+        (FURTHER.replace("more.ipynb", "more.py"), "give the name of a notebook"),
+        (FURTHER + FURTHER, "more.ipynb'; give the name of a notebook, once"),
+        (FURTHER.replace('cite = "x", ', ""), "lacks cite"),
+    ],
+)
+def test_a_chapter_that_cannot_be_read_is_refused(folder, spoiled, said):
+    folder(GOOD + spoiled)
+    with pytest.raises(ValueError, match=said):
+        ledger.load("paper")
+
+
+def test_a_claim_in_an_unknown_notebook_is_refused(folder):
+    folder(GOOD.replace('id = "paper.a"', 'id = "paper.a"\nnotebook = "more.ipynb"'))
+    with pytest.raises(ValueError, match=r"notebook 'more\.ipynb' is none of"):
+        ledger.load("paper")
+
+
 # ---- the ledger ----
 
 

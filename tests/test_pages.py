@@ -283,7 +283,8 @@ def drawn(tab) -> list:
 
 
 def test_every_chapter_has_a_picture_with_sliders(built):
-    notebooks = {"one_idea.ipynb", *(ledger.load(key).notebook for key in ledger.papers())}
+    chapters = [chapter for key in ledger.papers() for chapter in ledger.load(key).chapters]
+    notebooks = {"one_idea.ipynb", *(chapter.notebook for chapter in chapters)}
     assert {f"notebooks/{name.removesuffix('.ipynb')}.html" for name in notebooks} <= {
         *with_sliders(built)
     }

@@ -355,9 +355,9 @@ ROUND = {
         ["−"],
     ),
     pictures.draw_periodic_loop: (
-        [f"${s}(k)$" for s in "rewuv"],
+        [f"${s}(k)$" for s in "reuv"],
         ["hold $T(k)$", "$v(t)$", "$G(s)$", "$y(t)$", "$y(k)$"],
-        ["+"] * 3 + ["−", r"$Q\,q^{-(N-L)}$", "$q^{-L}$", "$G_c(k)$"],
+        ["+"] * 3 + ["−", r"$q\,z^{-(N-L)}$", "$z^{-L}$", "$C(k)$"],
     ),
 }
 

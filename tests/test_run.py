@@ -142,9 +142,12 @@ assert os.path.basename(os.getcwd()) == "notebooks\""""
 def test_an_interrupt_leaves_nothing_behind(make, number):
     project = make(one=[LEDGER, PID, "import time; time.sleep(60)"])
     for paper in map(ledger.load, ledger.papers()):  # the command looks for all of the package
-        title = nbformat.v4.new_markdown_cell(f"# {paper.title}")
-        stub = nbformat.v4.new_notebook(cells=[title])
-        nbformat.write(stub, project.notebooks / paper.notebook)
+        for chapter in paper.chapters:
+            title = nbformat.v4.new_markdown_cell(f"# {chapter.title}")
+            own = [c.id for c in paper.claims.values() if paper.place(c) == chapter.notebook]
+            judges = "\n".join(f"lambda: check({id!r})" for id in own)
+            stub = nbformat.v4.new_notebook(cells=[title, nbformat.v4.new_code_cell(judges)])
+            nbformat.write(stub, project.notebooks / chapter.notebook)
     run.write(project.ledger_file, "old\n")
     command = [sys.executable, "-m", "rcbook.cli", "check"]
     process = subprocess.Popen(command, cwd=project.root, stdout=-1, stderr=-1)

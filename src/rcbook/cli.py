@@ -45,7 +45,7 @@ def _parser() -> argparse.ArgumentParser:
     build = commands.add_parser("build", help="execute, judge and render to book/_build/html")
     build.set_defaults(run=_build)
     check = commands.add_parser("check", help="execute and judge; exit 1 when a verdict flips")
-    check.add_argument("--paper", metavar="KEY", help="only this chapter, with all its verdicts")
+    check.add_argument("--paper", metavar="KEY", help="only this paper, with all its verdicts")
     check.set_defaults(run=_check)
     falsify = commands.add_parser("falsify", help="change the model and see each verdict flip")
     falsify.add_argument("--paper", metavar="KEY", help="only this paper, such as horng1989")

@@ -1,7 +1,7 @@
 """Change the model a little and see which verdicts turn.
 
 A verdict that nothing turns says nothing.  Every scored claim names a change of `papers/KEY.toml`
-under which its verdict flips; here the notebook is run under that change, without its pictures,
+under which its verdict flips; here its notebooks are run under that change, without pictures,
 and the verdicts are compared.  Run at several sizes, a change also tells how far its parameter may
 move before a verdict flips.
 """
@@ -27,14 +27,14 @@ import rcbook
 from rcbook import ledger
 from rcbook.ledger import Ledger, Paper
 
-LIMIT = 900.0  # s per run; a notebook without its pictures takes less than with them
+LIMIT = 900.0  # s per run; notebooks without their pictures take less than with them
 SHORT = 30  # tolerances; over a longer way a number is not taken to move on a line
 SKIP = "no-claims"  # tag of cells that draw or sweep and feed no claim
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What one run of a notebook under one change came to."""
+    """What one run of a paper's notebooks under one change came to."""
 
     change: str
     size: float | None  # None for a change that has no size
@@ -92,7 +92,7 @@ def wanted(paper: Paper, change: str = "", every: bool = False) -> list[tuple[st
 
 
 def trials(paper: Paper, notebooks: Path, tries: Iterable[tuple[str, float | None]]) -> list[Trial]:
-    """Run the notebook of `paper` under each (change, size) of `tries`, side by side.
+    """Run the notebooks of `paper` under each (change, size) of `tries`, side by side.
 
     The change `""` leaves the model as it is.
     Raises ValueError for a change that the paper does not have, and for one that does not run.
@@ -108,12 +108,12 @@ def _trial(paper: Paper, notebooks: Path, name: str, size: float | None) -> Tria
     from rcbook.book.execute import kernel_environment
 
     code = paper.changes[name]["apply"] if name else ""
-    who = f"{paper.key}.toml: change {name!r}" if name else f"{paper.notebook} without a change"
+    who = f"{paper.key}.toml: change {name!r}" if name else f"{paper.key} without a change"
     with tempfile.TemporaryDirectory(prefix="rcbook-", ignore_cleanup_errors=True) as scratch:
         answer = Path(scratch) / "answer.json"  # a change may print what it likes
         job = json.dumps(
             {
-                "notebook": str(notebooks / paper.notebook),
+                "notebooks": [str(notebooks / chapter.notebook) for chapter in paper.chapters],
                 "apply": code,
                 "size": size,
                 "answer": str(answer),
@@ -136,17 +136,30 @@ def _trial(paper: Paper, notebooks: Path, name: str, size: float | None) -> Tria
         return Trial(name, size, **json.loads(answer.read_text(encoding="utf-8")))
 
 
-def run_cells(notebook: Path, apply: str, size: float | None) -> dict:
-    """Run the code cells of `notebook` in this process after the change `apply`.
+def run_cells(notebooks: Sequence[Path], apply: str, size: float | None) -> dict:
+    """Run the code cells of notebooks in this process, one by one, after the change `apply`."""
+    exec(apply, {"size": size})
+    warnings.simplefilter("ignore")  # a changed loop may well overflow
+    rows, troubles = [], []
+    for notebook in notebooks:
+        space = _space(notebook, troubles)
+        rows += [r for item in space.values() if isinstance(item, Ledger) for r in item.rows()]
+    return {
+        "verdicts": {row["id"]: row["verdict"] for row in rows},
+        "computed": {row["id"]: row["computed"] for row in rows},
+        "troubles": troubles,
+    }
+
+
+def _space(notebook: Path, troubles: list[str]) -> dict:
+    """The names that the code cells of one notebook bind; what failed is added to `troubles`.
 
     Statements run one by one, so that one that fails under the change takes no other with it.
     """
     import matplotlib.pyplot as plt
     import nbformat
 
-    exec(apply, {"size": size})
-    warnings.simplefilter("ignore")  # a changed loop may well overflow
-    space, troubles = {"__name__": "__main__", "display": lambda *_: None}, []
+    space = {"__name__": "__main__", "display": lambda *_: None}
     for cell in nbformat.read(notebook, as_version=4).cells:
         if cell.cell_type != "code" or SKIP in cell.metadata.get("tags", ()):
             continue
@@ -154,15 +167,10 @@ def run_cells(notebook: Path, apply: str, size: float | None) -> dict:
             try:
                 exec(compile(ast.Module([statement], []), cell.id, "exec"), space)
             except (Exception, SystemExit) as error:
-                troubles.append(f"{cell.id}: {type(error).__name__}: {error}")
+                troubles.append(f"{notebook.name}, {cell.id}: {type(error).__name__}: {error}")
                 _forget(statement, space)
         plt.close("all")
-    rows = [r for item in space.values() if isinstance(item, Ledger) for r in item.rows()]
-    return {
-        "verdicts": {row["id"]: row["verdict"] for row in rows},
-        "computed": {row["id"]: row["computed"] for row in rows},
-        "troubles": troubles,
-    }
+    return space
 
 
 def _forget(statement: ast.stmt, space: dict) -> None:
@@ -298,5 +306,5 @@ def store(paper: Paper, found: Mapping[str, Mapping]) -> Path:
 
 if __name__ == "__main__":
     job = json.load(sys.stdin)
-    said = run_cells(Path(job["notebook"]), job["apply"], job["size"])
+    said = run_cells(list(map(Path, job["notebooks"])), job["apply"], job["size"])
     Path(job["answer"]).write_text(json.dumps(said), encoding="utf-8")

@@ -145,9 +145,10 @@ def _texts(key: str) -> Iterable[tuple[str, str, Sequence[str]]]:
             yield f"reading {name}", plain, ()
     for name, change in data["changes"].items():
         yield f"change {name}", change["what"], ()
-    for name in ("loop", "index", "period"):
-        yield f"idea {name}", data["idea"][name], ()
-    yield "title", data["title"], ()
+    for chapter in (data, *data.get("further", [])):
+        for name in ("loop", "index", "period"):
+            yield f"idea {name}", chapter["idea"][name], ()
+        yield "title", chapter["title"], ()
 
 
 def _words() -> Iterable[tuple[str, str]]:

@@ -43,7 +43,7 @@ def _score(papers, rows, group: str, title: str, outside: bool) -> str:
     for paper in papers:
         own = [row for row in rows if row["paper"] == paper.key]
         tally = Counter(row["verdict"] for row in own if group in roles(row))
-        name = f'<a href="{_chapter(paper)}">{show.math(_short(paper))}</a>'
+        name = "<br>".join(_link(paper, chapter.notebook) for chapter in paper.chapters)
         cells = "".join(_count(paper.key, v, group, tally[v]) for v in ledger.VERDICTS)
         cells += _count(paper.key, "", group, tally.total())
         if outside:
@@ -72,14 +72,14 @@ def _count(paper: str, verdict: str, role: str, count: int) -> str:
 def idea_table(papers: Sequence[ledger.Paper]) -> str:
     """The papers as rows of one table: what loop, over what index, with what period."""
     head = "| chapter | loop | index | period $N$ |\n|---|---|---|---|\n"
-    return head + "".join(_idea(paper) for paper in papers)
+    return head + "".join(_idea(chapter) for paper in papers for chapter in paper.chapters)
 
 
-def _idea(paper: ledger.Paper) -> str:
-    idea = paper.idea
-    chapter = f"[{_short(paper)}](notebooks/{paper.notebook})"
+def _idea(chapter: ledger.Chapter) -> str:
+    idea = chapter.idea
+    name = f"[{_short(chapter.title)}](notebooks/{chapter.notebook})"
     loop = f"{idea['loop']} {{cite}}`{idea['cite']}`"
-    return f"| {chapter} | {loop} | {idea['index']} | {idea['period']} |\n"
+    return f"| {name} | {loop} | {idea['index']} | {idea['period']} |\n"
 
 
 def cover(notebook: str, heading: str, alt: str) -> str:
@@ -92,11 +92,14 @@ def cover(notebook: str, heading: str, alt: str) -> str:
 
 
 def chapters(papers: Sequence[ledger.Paper]) -> str:
-    """The papers as a list for the README: title with a link to the notebook, and citation."""
-    return "".join(
-        f"- [{paper.title}](notebooks/{paper.notebook}): {paper.citation.rstrip('.')}.\n"
-        for paper in papers
-    )
+    """The chapters as a list for the README: title with a link to the notebook, and citation."""
+    lines = []
+    for paper in papers:
+        for chapter in paper.chapters:
+            own = chapter.notebook == paper.notebook
+            source = f"{paper.citation.rstrip('.')}." if own else "the same paper."
+            lines.append(f"- [{chapter.title}](notebooks/{chapter.notebook}): {source}\n")
+    return "".join(lines)
 
 
 def ledger_page(papers: Sequence[ledger.Paper], rows: Sequence[Mapping]) -> str:
@@ -169,8 +172,7 @@ def _ledger_row(row: Mapping, paper: ledger.Paper) -> tuple[str, Sequence[str]]:
     id = html.escape(row["id"])
     claim = (
         f"{show.math(row['says'])}<br><small>{show.math(row['where'])} · "
-        f'<a href="{_chapter(paper)}#{show.anchor_of(row["id"])}">'
-        f"{show.math(_short(paper))}</a> · "
+        f"{_link(paper, row['notebook'], show.anchor_of(row['id']))} · "
         f'<a href="#{id}"><code>{id}</code></a></small>'
     )
     cells = (
@@ -240,6 +242,8 @@ def errata_page(papers: Sequence[ledger.Paper], rows: Sequence[Mapping]) -> str:
     ]
     for paper in papers:
         parts += [f"## {paper.title}", f"{paper.citation.rstrip('.')} (`{paper.key}`)."]
+        also = (f"[{c.title}](notebooks/{c.notebook})" for c in paper.further)
+        parts += [f"The same paper: {', '.join(also)}."] * bool(paper.further)
         for key, erratum in paper.errata.items():
             decided = [r for r in rows if r["paper"] == paper.key and r["erratum"] == key]
             parts.append(_erratum(paper.key, key, erratum, decided))
@@ -286,13 +290,16 @@ def api_page() -> str:
     return "(api)=\n# API reference\n\nGenerated from the docstrings.\n\n" + "\n".join(sections)
 
 
-def _chapter(paper: ledger.Paper) -> str:
-    return f"notebooks/{PurePosixPath(paper.notebook).stem}.html"
+def _link(paper: ledger.Paper, notebook: str, anchor: str = "") -> str:
+    """The short title of the chapter that a notebook of `paper` is, as a link to it, in HTML."""
+    title = next(c.title for c in paper.chapters if c.notebook == notebook)
+    place = f"notebooks/{PurePosixPath(notebook).stem}.html" + f"#{anchor}" * bool(anchor)
+    return f'<a href="{place}">{show.math(_short(title))}</a>'
 
 
-def _short(paper: ledger.Paper) -> str:
-    """The title of a chapter up to its colon."""
-    return paper.title.partition(":")[0]
+def _short(title: str) -> str:
+    """A title up to its colon."""
+    return title.partition(":")[0]
 
 
 def _anchor(paper: str, erratum: str) -> str:

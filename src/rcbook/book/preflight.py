@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import nbformat
@@ -36,14 +37,57 @@ def _of_paper(project: Project, paper: Paper) -> Iterable[str]:
     twins = [p.key for p in project.papers if p.chapter == paper.chapter and p is not paper]
     if twins:
         yield f"{file}: chapter {paper.chapter} is also that of {twins[0]}; give it another number"
-    path = project.notebooks / paper.notebook
-    if not path.is_file():
-        yield f"{file}: its notebook {paper.notebook} is not in notebooks/; put it there"
+    for chapter in paper.chapters:
+        path = project.notebooks / chapter.notebook
+        if not path.is_file():
+            yield f"{file}: its notebook {chapter.notebook} is not in notebooks/; put it there"
+        elif cells := _cells(path):
+            first = cells[0].source.splitlines()[0] if cells[0].source else ""
+            if first != f"# {chapter.title}":
+                wanted = f"make it '# {chapter.title}', the title"
+                yield f"{chapter.notebook}: its first line is {first!r}; {wanted}"
+            yield from _places(paper, chapter.notebook, _checked(cells))
+
+
+def _places(paper: Paper, notebook: str, checked: Sequence[re.Pattern]) -> Iterable[str]:
+    """Claims that are judged in another notebook than their data say, where several share them."""
+    if not paper.further:
         return
-    cells = _cells(path)
-    first = cells[0].source.splitlines()[0] if cells and cells[0].source else ""
-    if first != f"# {paper.title}":
-        yield f"{paper.notebook}: its first line is {first!r}; make it '# {paper.title}', the title"
+    own = [id for id, claim in paper.claims.items() if paper.place(claim) == notebook]
+    if not own:
+        yield f"{paper.key}.toml: no claim has notebook = {notebook!r}; give it some or remove it"
+    for id in own:
+        if not any(pattern.fullmatch(id) for pattern in checked):
+            yield f"{notebook}: it does not judge {id}, which is its own; check it there"
+    for pattern in checked:
+        if not any(map(pattern.fullmatch, own)):
+            for id in filter(pattern.fullmatch, paper.claims):
+                place = paper.place(paper.claims[id])
+                yield f"{notebook}: it judges {id}, which {place} should; move the one or the other"
+
+
+def _checked(cells: Iterable[nbformat.NotebookNode]) -> list[re.Pattern]:
+    """The ids of claims that code cells check, each as a pattern: a part that only a run can know
+    may be anything."""
+    found = []
+    for cell in cells:
+        if cell.cell_type != "code":
+            continue
+        try:
+            nodes = list(ast.walk(ast.parse(cell.source)))
+        except SyntaxError:
+            continue  # the run says why
+        for call in (node for node in nodes if isinstance(node, ast.Call)):
+            name = getattr(call.func, "attr", getattr(call.func, "id", ""))
+            if name == "check" and call.args:
+                found.append(_pattern(call.args[0]))
+    return found
+
+
+def _pattern(id: ast.expr) -> re.Pattern:
+    parts = id.values if isinstance(id, ast.JoinedStr) else [id]
+    known = (part.value if isinstance(part, ast.Constant) else None for part in parts)
+    return re.compile("".join(".+" if part is None else re.escape(str(part)) for part in known))
 
 
 def _cells(path: Path) -> list[nbformat.NotebookNode]:
@@ -75,7 +119,10 @@ def _contents(project: Project) -> Iterable[str]:
 def _citations(project: Project) -> Iterable[str]:
     """Keys that are cited and not in the bibliography."""
     known = set(_ENTRY.findall(read_text(project.book / "references.bib")))
-    texts = {f"{paper.key}.toml": f"{{cite}}`{paper.idea['cite']}`" for paper in project.papers}
+    texts = {}
+    for paper in project.papers:
+        cited = ",".join(chapter.idea["cite"] for chapter in paper.chapters)
+        texts[f"{paper.key}.toml"] = f"{{cite}}`{cited}`"
     for path in project.notebooks.glob("*.ipynb"):
         texts[path.name] = "\n".join(cell.source for cell in _cells(path))
     for path in project.book.glob("*.md"):

@@ -70,14 +70,15 @@ def _mark_stale(project: Project) -> None:
 
 
 def check_paper(project: Project, paper: ledger.Paper, limit: float = LIMIT) -> Run:
-    """Execute the notebook of one paper and say what came out; the ledger file stays as it is.
+    """Execute the notebooks of one paper and say what came out; the ledger file stays as it is.
 
-    Raises ValueError when its notebook is not there.
+    Raises ValueError when one of them is not there.
     """
-    path = project.notebooks / paper.notebook
-    if not path.is_file():
-        raise ValueError(f"{paper.key}.toml: its notebook {path} is not there; put it there")
-    run = judge([paper], *execute([path], limit))
+    paths = [project.notebooks / chapter.notebook for chapter in paper.chapters]
+    for path in paths:
+        if not path.is_file():
+            raise ValueError(f"{paper.key}.toml: its notebook {path} is not there; put it there")
+    run = judge([paper], *execute(paths, limit))
     for row in run.rows:
         print(show.line(row))
     report(run)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal, InvalidOperation
 
@@ -69,6 +69,7 @@ class Claim:
     mended: str = ""  # `printed` after its erratum, where digits themselves are the misprint
     reason: str = ""  # format string over the evidence
     lost: str = ""  # what is lost that a computation would need, such as a figure
+    notebook: str = ""  # where it is judged, if not in the paper's own notebook
     parsed: Printed = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -97,6 +98,15 @@ class Claim:
 
 
 @dataclass(frozen=True)
+class Chapter:
+    """A notebook that judges claims of a paper."""
+
+    notebook: str
+    title: str
+    idea: Mapping[str, str]  # its row in the table of the one idea: cite, loop, index, period
+
+
+@dataclass(frozen=True)
 class Paper:
     """Everything `papers/KEY.toml` says about one paper."""
 
@@ -105,12 +115,22 @@ class Paper:
     citation: str
     notebook: str
     chapter: int  # its place in the order of reading
-    idea: Mapping[str, str]  # its row in the table of the one idea: cite, loop, index, period
+    idea: Mapping[str, str]  # as in a `Chapter`
     conventions: Mapping[str, Mapping[str, str]]  # each a `title` and a `text`
     errata: Mapping[str, Mapping[str, str]]
     changes: Mapping[str, Mapping]  # of the model, which turn verdicts; see `falsify`
     claims: Mapping[str, Claim]
     margins: Mapping[str, Mapping] = field(default_factory=dict)  # as `falsify` measured them
+    further: Sequence[Chapter] = ()  # whose claims name their notebook
+
+    @property
+    def chapters(self) -> tuple[Chapter, ...]:
+        """All chapters about the paper, in the order of reading."""
+        return Chapter(self.notebook, self.title, self.idea), *self.further
+
+    def place(self, claim: Claim) -> str:
+        """The notebook that judges a claim."""
+        return claim.notebook or self.notebook
 
 
 def parse(claim: Claim) -> Printed:

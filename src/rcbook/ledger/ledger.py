@@ -29,26 +29,40 @@ class Extract:
 
 @dataclass
 class Ledger:
-    """The claims of one paper and the judgements made so far, in the order of the paper."""
+    """The claims of one paper and the judgements made so far, in the order of the paper.
+
+    `notebook` is the one whose claims are judged, if it is not the paper's own.
+    """
 
     paper: Paper
     judgements: dict[str, Judgement] = field(default_factory=dict)
+    notebook: str = ""
     _fresh: list[str] = field(default_factory=list)
 
     @classmethod
-    def of(cls, key: str) -> Ledger:
-        """An empty ledger for the paper `key`."""
-        return cls(load(key))
+    def of(cls, key: str, notebook: str = "") -> Ledger:
+        """An empty ledger for the paper `key`, in its own notebook or in a further one.
+
+        Raises ValueError for a notebook that the paper does not have.
+        """
+        paper = load(key)
+        names = [chapter.notebook for chapter in paper.chapters]
+        if notebook and notebook not in names:
+            raise ValueError(f"{key}.toml has no chapter {notebook!r}; it has {', '.join(names)}")
+        return cls(paper, notebook=notebook)
 
     def check(self, id: str, value: object = None, corrected: object = None, **evidence):
         """Judge claim `id` (see `judge`), keep the judgement and return it.
 
-        Raises ValueError for an id the paper does not have.
+        Raises ValueError for an id the paper does not have, or that another notebook judges.
         """
         if id not in self.paper.claims:
             raise ValueError(
                 f"{self.paper.key} has no claim {id!r}; see papers/{self.paper.key}.toml"
             )
+        place = self.paper.place(self.paper.claims[id])
+        if place != (self.notebook or self.paper.notebook):
+            raise ValueError(f"{id} is judged in {place}; check it there")
         self.judgements[id] = judge(self.paper.claims[id], value, corrected, **evidence)
         self._fresh[:] = [*(fresh for fresh in self._fresh if fresh != id), id]
         return self.judgements[id]
@@ -69,8 +83,10 @@ class Ledger:
         return judgement.evidence[name]
 
     def missing(self) -> list[str]:
-        """Ids of the claims not checked yet."""
-        return [id for id in self.paper.claims if id not in self.judgements]
+        """Ids of the claims of this notebook that are not checked yet."""
+        claims, here = self.paper.claims, self.notebook or self.paper.notebook
+        own = (id for id, claim in claims.items() if self.paper.place(claim) == here)
+        return [id for id in own if id not in self.judgements]
 
     def rows(self) -> list[dict]:
         """The judged claims as the list of objects that the ledger file holds."""
@@ -117,7 +133,7 @@ def _row(paper: Paper, judgement: Judgement) -> dict:
         "convention": paper.conventions[claim.convention]["text"],
         "reason": judgement.reason,
         "erratum": claim.erratum,
-        "notebook": paper.notebook,
+        "notebook": paper.place(claim),
         "kind": claim.kind,
         "reading": claim.convention,
         "evidence": _finite(dict(judgement.evidence)),

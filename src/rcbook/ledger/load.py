@@ -17,6 +17,7 @@ from rcbook.ledger.claim import (
     NOT_REPRODUCED,
     ROLES,
     VERDICTS,
+    Chapter,
     Claim,
     Paper,
     tolerances,
@@ -44,10 +45,10 @@ def load(key: str) -> Paper:
     data = source(key)
     if data.get("key") != key:
         raise ValueError(f"{key}.toml: its key is {data.get('key')!r}; make it {key!r}")
-    parts = [f.name for f in fields(Paper) if f.name not in ("key", "margins")]
+    parts = [f.name for f in fields(Paper) if f.name not in ("key", "margins", "further")]
     if absent := [part for part in parts if part not in data]:
         raise ValueError(f"{key}.toml lacks {', '.join(absent)}; add them")
-    if unknown := data.keys() - {"key", *parts}:
+    if unknown := data.keys() - {"key", "further", *parts}:
         raise ValueError(f"{key}.toml: unknown part {', '.join(sorted(unknown))}; remove it")
     _check_types(key, data)
     _check_tables(key, data)
@@ -62,7 +63,8 @@ def load(key: str) -> Paper:
     except (ValueError, AttributeError):
         raise ValueError(f"{margins.name} is damaged; remove it and measure anew") from None
     given = _unmarked({part: data[part] for part in parts}) | {"claims": claims}
-    return Paper(key, **given, margins=measured)
+    further = [Chapter(**_unmarked(entry)) for entry in data.get("further", [])]
+    return Paper(key, **given, margins=measured, further=further)
 
 
 _TYPES = {"title": str, "citation": str, "notebook": str, "chapter": int, "claims": list}
@@ -75,8 +77,7 @@ def _check_types(key: str, data: Mapping) -> None:
             raise ValueError(f"{key}.toml: {name} = {data[name]!r} is no {kind.__name__}; mend it")
     if data["chapter"] < 1 or not data["title"].strip():
         raise ValueError(f"{key}.toml: give a title and a chapter of 1 or more")
-    if not data["notebook"].endswith(".ipynb") or {"/", "\\"} & {*data["notebook"]}:
-        raise ValueError(f"{key}.toml: notebook {data['notebook']!r}; give the name of a notebook")
+    _check_chapters(key, data)
     for entry in data["claims"]:
         if not isinstance(entry, dict):
             raise ValueError(f"{key}.toml: claim {entry!r} is no table; write [[claims]]")
@@ -88,6 +89,27 @@ def _check_types(key: str, data: Mapping) -> None:
                 raise ValueError(f"{key}.toml, {at}: {name} = {given!r}; give {wanted}")
 
 
+def _check_chapters(key: str, data: Mapping) -> None:
+    """The paper's own notebook and further ones, which are tables with title and idea."""
+    further = data.get("further", [])
+    if not isinstance(further, list) or not all(isinstance(entry, dict) for entry in further):
+        raise ValueError(f"{key}.toml: further = {further!r} is no list; write [[further]]")
+    wanted = {field.name for field in fields(Chapter)}
+    for entry in further:
+        if wrong := wanted ^ entry.keys():
+            raise ValueError(
+                f"{key}.toml, [[further]]: {', '.join(sorted(wrong))} is missing or unknown; "
+                f"give {', '.join(sorted(wanted))}"
+            )
+        if not str(entry["title"]).strip():
+            raise ValueError(f"{key}.toml, [[further]]: give a title")
+    names = [data["notebook"], *(entry["notebook"] for entry in further)]
+    for name in names:
+        named = isinstance(name, str) and name.endswith(".ipynb")
+        if not named or {"/", "\\"} & {*name} or names.count(name) > 1:
+            raise ValueError(f"{key}.toml: notebook {name!r}; give the name of a notebook, once")
+
+
 _TABLES = {  # fields that must be there, and fields that may be
     "conventions": ({"title", "text"}, set()),
     "errata": ({"where", "printed", "corrected", "why"}, set()),
@@ -96,7 +118,8 @@ _TABLES = {  # fields that must be there, and fields that may be
 
 
 def _check_tables(key: str, data: Mapping) -> None:
-    entries = [("idea", data["idea"], ({"cite", "loop", "index", "period"}, set()))]
+    ideas = [data["idea"], *(chapter["idea"] for chapter in data.get("further", []))]
+    entries = [("idea", idea, ({"cite", "loop", "index", "period"}, set())) for idea in ideas]
     for name, allowed in _TABLES.items():
         entries += [(f"{name}.{at}", entry, allowed) for at, entry in data[name].items()]
     for at, entry, (needed, optional) in entries:
@@ -186,6 +209,7 @@ def _unknown(claim: Claim, data: Mapping) -> str:
         "erratum": ("", *data["errata"]),
         "flips_under": ("", *data["changes"]),
         "word": ("", *ROW_OF),
+        "notebook": ("", *(chapter["notebook"] for chapter in data.get("further", []))),
     }
     for name, choices in known.items():
         if (given := getattr(claim, name)) not in choices:

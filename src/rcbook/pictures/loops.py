@@ -157,10 +157,10 @@ def draw_periodic_loop(ax: Axes) -> Axes:
     size = {"width": 2.0, "height": 1.4}
     items = [
         *(Sum("error", (1.7, 0.0)), Sum("learned", (4.1, 0.0), _ADD)),
-        Block("memory", r"$Q\,q^{-(N-L)}$", (7.15, 0.0), FOCUS),
-        Block("rest", "$q^{-L}$", (7.15, 1.5), FOCUS),
+        Block("memory", r"$q\,z^{-(N-L)}$", (7.15, 0.0), FOCUS),
+        Block("rest", "$z^{-L}$", (7.15, 1.5), FOCUS),
         Node("tap", (9.4, 0.0)),
-        Block("compensator", "$G_c(k)$", (12.0, 0.0), FOCUS),
+        Block("compensator", "$C(k)$", (12.0, 0.0), FOCUS),
         Block("hold", "hold $T(k)$", (14.4, -2.6), icon=blocks.HELD, **size),
         Block("plant", "$G(s)$", (9.4, -2.6), PLANT, **size),
         Block("sampler", "sampled\n$T(k)$", (4.4, -2.6), **size),
@@ -169,7 +169,7 @@ def draw_periodic_loop(ax: Axes) -> Axes:
         Frame("period", (6.55, 0.6), 6.4, 3.6, title="memory of one period"),
     ]
     wires = [
-        *path((0.0, 0.0), "$r(k)$", "error", "$e(k)$", "learned", "$w(k)$", "memory", "", "tap"),
+        *path((0.0, 0.0), "$r(k)$", "error", "$e(k)$", "learned", "", "memory", "", "tap"),
         *path("tap", "$u(k)$", "compensator", "$v(k)$", "hold", "$v(t)$", "plant"),
         *path("plant", "$y(t)$", "sampler", "$y(k)$", "y", "", "error"),
         *(Wire("tap", "rest", via=1.5), Wire("rest", "learned", via=1.5)),

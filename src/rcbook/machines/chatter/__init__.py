@@ -7,6 +7,7 @@ steps and only the duration of the steps varies: a plant sampled at T(k), as eve
 study of Hanson and Tsao.
 """
 
+from rcbook.machines.chatter.averaged import averaged_limit, surface_factor
 from rcbook.machines.chatter.chart import stability_chart
 from rcbook.machines.chatter.constant_speed import least_limit, lobes, rightmost_root
 from rcbook.machines.chatter.cut import (
