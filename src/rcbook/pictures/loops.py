@@ -72,14 +72,17 @@ def draw_learning_loop(ax: Axes) -> Axes:
 
 
 def draw_repetitive_generator(ax: Axes) -> Axes:
-    """Draw the inside of a repetitive controller, `k_r q z^-(N-d) C / (1 - q z^-N)` as a whole."""
+    """Draw the inside of a repetitive controller, `k_r q z^-N C / (1 - q z^-N)` as a whole.
+
+    C looks L samples ahead, so it is causal together with the part z^-L of the delay.
+    """
     items, wires = row(
         *("$e$", Block("gain", "$k_r$"), "", Sum("sum", signs={"w": "+", "s": "+"}), ""),
-        *(Block("memory", r"$q(z)\,z^{-(N-d-\nu)}$", fill=FOCUS), "", Node("tap"), ""),
-        *(Block("compensator", r"$z^{-\nu}\,C(z)$"), "$u$"),
+        *(Block("memory", r"$q(z)\,z^{-(N-L)}$", fill=FOCUS), "", Node("tap"), ""),
+        *(Block("compensator", r"$z^{-L}\,C(z)$"), "$u$"),
     )
     (middle,) = (item.xy[0] for item in items if item.name == "memory")
-    items.append(Block("rest", r"$z^{-(d+\nu)}$", (middle, -1.5), FOCUS))
+    items.append(Block("rest", r"$z^{-L}$", (middle, -1.5), FOCUS))
     wires += [Wire("tap", "rest", via=-1.5), Wire("rest", "sum", via=-1.5)]
     return blocks.draw_block_diagram(ax, items, wires)
 

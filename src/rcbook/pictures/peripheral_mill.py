@@ -32,9 +32,9 @@ def draw_milling_setup(ax: Axes, mill: PeripheralMill = HORNG1989) -> Axes:
     ]
     sketch.line([(8.35, 2.3), corner], solid_capstyle="projecting")
     wires = [
-        Wire(corner, "filter", "force $F$", via=7.2),
+        Wire(corner, "filter", "force $y$", via=7.2),
         *path("filter", "", "sampler", "", "computer"),
-        Wire("computer", (9.3, 0.62), "feed command $V$ (mV)", via=0.62),
+        Wire("computer", (9.3, 0.62), "feed command $v$ (mV)", via=0.62),
     ]
     add_blocks(sketch, items, wires)
     return ax
