@@ -345,13 +345,13 @@ ROUND = {
         ["+"] * 3 + ["−"],
     ),
     pictures.draw_spindle_drive: (
-        ["$U_w^*$", "velocity control", "50 A", "$U_i^*$", "voltage"],
-        ["armature", "$i$", "$C_{w1}$", "spindle", "$w$"],
+        ["$v$", "velocity control", "50 A", "$U_i^*$", "voltage"],
+        ["armature", "$i$", "$C_{w1}$", "spindle", r"$\Omega$"],
         ["+", "−"] * 4 + [r"$T_\mathrm{cut}$", "back EMF", "$K_f$", "$C_{w2}$", "cut $G_d$"],
     ),
     pictures.draw_angle_loop: (
-        ["$F_0$", "$L_n$", r"$F(z^{-1})\,z^{-N}$", "$C(z^{-1})$"],
-        ["spindle\ndrive", "$w$", "cut", "$F_{ti}$", r"$F_{t\max}$"],
+        ["$r$", "$e$", "$k_r$", r"$q\,z^{-N}$", "$C$", "$u$", "$v$"],
+        ["spindle\ndrive", r"$\Omega$", "cut", "$F_i$", "$y$"],
         ["−"],
     ),
     pictures.draw_periodic_loop: (

@@ -36,7 +36,9 @@ def draw_face_mill_setup(ax: Axes, mill: FaceMill = TSAO_PONG1991) -> Axes:
     sketch.write(words, 7.0, 0.62, "left", cutter.centre, color=DISTURBED)
     sketch.words(("spindle axis", 0.8, 2.05, "left", AXIS), (chip, 12.35, 3.9, "left", end))
     sketch.words(("entry, 0°", AXIS[0], 7.95), ("exit, 180°", AXIS[0], 0.62))
-    sketch.words(("speed $w$", 2.2, 7.35), ("feed $v_0$", 13.05, 2.3), ("workpiece", 10.2, 6.2))
+    sketch.words(
+        (r"speed $\Omega$", 2.2, 7.35), ("feed $v_f$", 13.05, 2.3), ("workpiece", 10.2, 6.2)
+    )
     return ax
 
 
@@ -116,7 +118,7 @@ def _draw_cutter(sketch: Sketch, cutter: Cutter) -> None:
         sketch.line(about(AXIS, [2.5, 3.55], end), THIN)
         sketch.turn(AXIS, 3.3, (ends.mean(), end), THIN)
     sketch.words((r"$\Delta\theta$", *about(AXIS, 3.75, ends.mean())))
-    sketch.words((r"$\theta_i$", *about(AXIS, 0.8, STANDS / 2)), ("$F_t$", 8.30, 5.80))
+    sketch.words((r"$\theta_i$", *about(AXIS, 0.8, STANDS / 2)), ("$F_i$", 8.30, 5.80))
 
 
 def draw_cut(axes: Sequence[Axes], run: Run) -> None:

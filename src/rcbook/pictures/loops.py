@@ -112,12 +112,12 @@ def draw_spindle_drive(ax: Axes, drive: SpindleDrive = spindle_drive.TSAO_PONG19
         Block("emf", "$C_{w2}$", (8.4, -6.2), PLANT),
     ]
     wires = [
-        *path((0.0, 0.0), "$U_w^*$", "speed error", "", "velocity", "", "limit"),
+        *path((0.0, 0.0), "$v$", "speed error", "", "velocity", "", "limit"),
         *path("limit", "$U_i^*$", "current error", "", "current", "voltage", "voltage"),
         *path("voltage", "", "motor", "$i$", "i", "", "sensor", "", "current error"),
         *path("i", "", "torque", "", "torque error", "", "inertia", "", "cut off", "", "w"),
         *path("w", "", "tacho", "", "speed error"),
-        Wire("w", (0.0, -3.5), "$w$"),
+        Wire("w", (0.0, -3.5), r"$\Omega$"),
         Wire("cut off", "cut", via=-5.1, dashed=True),
         Wire("cut", "torque error", r"$T_\mathrm{cut}$", color=DISTURBED, dashed=True),
         *(Wire("w", "emf", via=-6.2), Wire("emf", "voltage", "back EMF")),
@@ -130,11 +130,11 @@ def draw_angle_loop(ax: Axes, mill: FaceMill = face_mill.TSAO_PONG1991) -> Axes:
     step, size = f"{360 / mill.samples_per_turn:g}°", {"width": 2.0, "height": 1.5}
     items = [
         Sum("error", (1.9, 0.0)),
-        Block("gain", "$L_n$", (3.7, 0.0), FOCUS),
+        Block("gain", "$k_r$", (3.7, 0.0), FOCUS),
         Sum("learned", (5.4, 0.0), _ADD),
-        Block("memory", r"$F(z^{-1})\,z^{-N}$", (7.9, 0.0), FOCUS, title="memory of a turn"),
+        Block("memory", r"$q\,z^{-N}$", (7.9, 0.0), FOCUS, title="memory of a turn"),
         Node("tap", (9.95, 0.0)),
-        Block("inverse", "$C(z^{-1})$", (11.5, 0.0), FOCUS),
+        Block("inverse", "$C$", (11.5, 0.0), FOCUS),
         Sum("command", (13.6, 0.0), _ADD),
         Block("hold", f"hold {step}", (15.6, -3.4), icon=blocks.HELD, **size),
         Block("drive", "spindle\ndrive", (12.25, -3.4), PLANT, **size),
@@ -144,11 +144,12 @@ def draw_angle_loop(ax: Axes, mill: FaceMill = face_mill.TSAO_PONG1991) -> Axes:
         Frame("angle", (9.0, -3.55), 9.0, 3.2, title=r"in the cutter angle $\theta$"),
     ]
     wires = [
-        *path((0.0, 0.0), "$F_0$", "error", "", "gain", "", "learned", "", "memory", "", "tap"),
-        *path("tap", "", "inverse", "", "command", "$U_w^*(k)$", "hold", "", "drive", "$w$", "cut"),
-        *path("cut", "$F_{ti}$", "largest", r"$F_{t\max}$", "sampler", "", "error"),
+        *path((0.0, 0.0), "$r$", "error", "$e$", "gain", "", "learned", "", "memory", "", "tap"),
+        *path("tap", "", "inverse", "$u$", "command", "$v$", "hold"),
+        *path("hold", "", "drive", r"$\Omega$", "cut"),
+        *path("cut", "$F_i$", "largest", "$y$", "sampler", "", "error"),
         Wire("tap", "learned", via=1.55),
-        Wire((13.6, 1.2), "command", "nominal $U_0$"),
+        Wire((13.6, 1.2), "command", "nominal $v_0$"),
         Wire("cut", "drive", r"$T_\mathrm{cut}$", via=-4.8, dashed=True),
         Wire((9.0, -1.75), "cut", r"runout $\Delta_i$", color=DISTURBED),
     ]
