@@ -12,7 +12,7 @@ import nbformat
 from PIL import Image
 
 from rcbook import ledger
-from rcbook.book import links, sliders
+from rcbook.book import data, links, sliders
 from rcbook.book.execute import alternative
 from rcbook.ledger import show
 from rcbook.ledger.marks import without_marks
@@ -45,6 +45,7 @@ def shown(
     to read, has no marks of numbers, and ids in its ledgers lead to the ledger page.
     """
     notebook = nbformat.from_dict(notebook)
+    data.link(notebook.cells, PurePosixPath(name).stem)
     notebook.cells[0].source += f"\n\n{reading_time(notebook)}\n"
     texts = [cell for cell in notebook.cells if cell.cell_type == "markdown"]
     written = links.first_uses([without_marks(cell.source) for cell in texts], terms)
@@ -103,7 +104,7 @@ def figures(cells: Sequence[nbformat.NotebookNode], chapter: str) -> list[nbform
         if before is not None and _is_picture(before) and cell.source.startswith("**"):
             caption, _, rest = cell.source.partition("\n\n")
             figure = before.metadata["mystnb"].setdefault("figure", {})
-            figure.setdefault("name", f"fig-{chapter}-{before.get('id', '')}")
+            figure["name"] = data.name(before, chapter)
             figure["caption"] = caption
             cell.source = rest
         if cell.source.strip():
