@@ -9,9 +9,10 @@ from IPython.core.formatters import BaseFormatter
 
 def load_ipython_extension(shell) -> None:
     """Let each figure that is shown have its numbers beside its picture, as `text/csv`."""
-    # A method of this name has no class; only the figures asked for below get numbers.
+    # No class has a method of this name; only the figures asked for below get numbers.
     sheets = BaseFormatter(format_type="text/csv", print_method="_repr_csv_")
-    sheets.for_type_by_name("matplotlib.figure", "Figure", _numbers)
+    # By the class below `Figure`, of which the inline backend takes away all that is registered.
+    sheets.for_type_by_name("matplotlib.figure", "FigureBase", _numbers)
     shell.display_formatter.formatters["text/csv"] = sheets
 
 
