@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import base64
+import copy
 import io
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import PurePosixPath
 
 import nbformat
+from bs4 import BeautifulSoup, Tag
 from PIL import Image
 
 from rcbook import ledger
@@ -22,15 +23,6 @@ LEDGER = "../ledger.html"  # as a chapter sees it
 HEAVIER = 2.5  # so many times the weight of its pixels a figure may have as lines
 FOLDED = "hide-input"
 _WORDS_A_MINUTE = 200  # of a text with formulas
-_CORNER = re.compile(r"<th[^>]*>(?:&nbsp;)?</th>")
-_HEAD = re.compile(r"<th\b[^>]*>[^<]*</th>")
-_FORMULA, _TYPESET = re.compile(r"\$([^$<]+)\$"), r'<span class="math notranslate">\\(\1\\)</span>'
-_STYLED = re.compile(r'<style type="text/css">.*?</style>\s*| (?:id|class)="[^"]*"', re.DOTALL)
-_INDEX_NAMES = re.compile(
-    r"<tr>\s*<th[^>]*>(?:&nbsp;)?</th>(.*?)</tr>\s*"  # the columns' names, below an empty corner
-    r"<tr>\s*<th[^>]*>([^<]+)</th>(?:\s*<t[hd][^>]*>(?:&nbsp;)?</t[hd]>)*\s*</tr>",
-    re.DOTALL,
-)
 
 
 def shown(
@@ -74,7 +66,8 @@ def reading_time(notebook: nbformat.NotebookNode) -> str:
 def bars(cells: Sequence[nbformat.NotebookNode]) -> list[nbformat.NotebookNode]:
     """The cells with folded code that shows nothing joined to the folded code after it, or before.
 
-    Else a bar that unfolds stands in the page with nothing below it.
+    Else a bar that unfolds stands in the page with nothing below it.  What has no such neighbour is
+    left to the notebook.
     """
     joined: list[nbformat.NotebookNode] = []
     for cell in cells:
@@ -87,7 +80,7 @@ def bars(cells: Sequence[nbformat.NotebookNode]) -> list[nbformat.NotebookNode]:
                 last.source += f"\n\n\n{cell.source}"
                 continue
         joined.append(cell)
-    return joined
+    return [cell for cell in joined if not _folded(cell) or cell.outputs]
 
 
 def _folded(cell: nbformat.NotebookNode) -> bool:
@@ -145,16 +138,42 @@ def _link(data: dict) -> None:
 
 
 def table(html: str) -> str:
-    """The HTML of an output, its tables of pandas in the book's own style and with one head.
+    """The HTML of an output, its tables of pandas in the book's own style.
 
-    The names that pandas draws by chance go, the name of the index comes into the corner, an empty
-    corner heads no column, and formulas in its heads are marked for MathJax.
+    They get one head, with the names of the index in its corner, a name in every row where pandas
+    lets one stand for several, and no attributes, some of which pandas draws by chance.
     """
-    if 'id="T_' in html:
-        html = _STYLED.sub("", html)
-    html = _INDEX_NAMES.sub(r"<tr><th>\2</th>\1</tr>", html)
-    html = _CORNER.sub("<td></td>", html)
-    return _HEAD.sub(lambda head: _FORMULA.sub(_TYPESET, head[0]), html)
+    if 'id="T_' not in html and 'class="dataframe"' not in html:
+        return html
+    soup = BeautifulSoup(html, "html.parser")
+    for style in soup("style"):
+        style.decompose()
+    for drawn in soup("table"):
+        heads = drawn.thead("tr") if drawn.thead else []
+        pairs = [*zip(*(head("th") for head in heads), strict=False)] if len(heads) == 2 else []
+        if pairs and not any(above.text.strip() and below.text.strip() for above, below in pairs):
+            for above, below in pairs:
+                above.string = above.text.strip() or below.text.strip()
+            heads[1].decompose()
+        for spanning in drawn.select("tbody th[rowspan]"):
+            for row in spanning.parent.find_next_siblings("tr", limit=int(spanning["rowspan"]) - 1):
+                row.insert(0, copy.copy(spanning))
+        for cell in drawn(True):
+            cell.attrs = {}
+        drawn.attrs = {}
+        for head in drawn.select("thead th"):
+            _set_head(head)
+    return str(soup)
+
+
+def _set_head(head: Tag) -> None:
+    """An empty corner heads no column; a formula in a head is marked for MathJax."""
+    text = head.get_text(strip=True)
+    if not text:
+        head.name = "td"
+    elif "$" in text:
+        head.clear()
+        head.append(BeautifulSoup(show.math(text), "html.parser"))
 
 
 def _lighten(data: dict) -> None:
