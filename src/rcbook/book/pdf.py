@@ -6,7 +6,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from playwright.sync_api import Page, sync_playwright
@@ -106,3 +106,31 @@ def _print(page: Page, target: Path) -> None:
         outline=True,
         tagged=True,
     )
+
+
+def chapter_pages(pdf: bytes, names: Iterable[str]) -> dict[str, int]:
+    """On which page of a PDF as Chromium writes it each of the links `names` leads.
+
+    Its objects that say so are plain text.
+    """
+    inner = dict(_INNER.findall(pdf))
+    root = next(iter(_ROOT.findall(pdf)), b"")
+    order = {number: i for i, number in enumerate(_leaves(root, inner), 1)}
+    found = {}
+    for name in names:
+        place = re.search(rb"/%s \[(\d+) 0 R /XYZ" % re.escape(name.encode()), pdf)
+        if place and place[1] in order:
+            found[name] = order[place[1]]
+    return found
+
+
+_INNER = re.compile(rb"\n(\d+) 0 obj\n<</Type /Pages\n[^>]*?/Kids \[([^\]]*)\]")
+_ROOT = re.compile(rb"/Type /Catalog\n/Pages (\d+) 0 R")
+
+
+def _leaves(node: bytes, inner: Mapping[bytes, bytes]) -> Iterable[bytes]:
+    """The pages below a node of the tree of pages, in order."""
+    if node not in inner:
+        return [node]
+    children = re.findall(rb"(\d+) 0 R", inner[node])
+    return [leaf for child in children for leaf in _leaves(child, inner)]
