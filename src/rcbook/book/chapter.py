@@ -114,8 +114,8 @@ def _beside(cell: nbformat.NotebookNode) -> list[nbformat.NotebookNode]:
     if not others:
         return []
     cell.outputs = [o for o in cell.outputs if o not in others]
-    behind = nbformat.v4.new_code_cell("", metadata={"tags": ["remove-input"]}, outputs=others)
-    return [behind]
+    kept = {"metadata": {"tags": ["remove-input"]}, "outputs": others}
+    return [nbformat.v4.new_code_cell("# an empty cell would be skipped, outputs and all", **kept)]
 
 
 def _is_picture(cell: nbformat.NotebookNode) -> bool:

@@ -6,6 +6,7 @@ import csv
 import html
 import io
 import re
+import zipfile
 from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path, PurePosixPath
@@ -18,6 +19,7 @@ from rcbook.pictures.sliders import MIME as SLIDERS
 
 CSV = "text/csv"
 FOLDER = "data"  # of the book
+HEAVY = 1_000_000  # bytes, from which on a file is packed; names that repeat pack well
 _TITLE = re.compile(r"\*\*(.+?)\*\*", re.DOTALL)
 
 
@@ -31,7 +33,7 @@ def link(cells: Sequence[nbformat.NotebookNode], chapter: str) -> None:
     for cell, after in zip(cells, [*cells[1:], None], strict=True):
         titled = _TITLE.match(without_marks(after.source)) if after is not None else None
         title = titled[1] if titled else ""
-        files = _sheets(cell, chapter)
+        files = _files(cell, chapter)
         for output in cell.get("outputs", ()):
             output.get("data", {}).pop(CSV, None)
         for file in files:
@@ -45,17 +47,29 @@ def write(html_folder: Path, notebooks: Mapping[str, nbformat.NotebookNode]) -> 
         chapter = PurePosixPath(notebook_name).stem
         folder = html_folder / FOLDER / chapter
         for cell in notebook.cells:
-            for file, text in _sheets(cell, chapter).items():
+            for file, content in _files(cell, chapter).items():
                 folder.mkdir(parents=True, exist_ok=True)
-                (folder / file).write_text(text, encoding="utf-8", newline="\n")
+                (folder / file).write_bytes(content)
 
 
-def _sheets(cell: nbformat.NotebookNode, chapter: str) -> dict[str, str]:
-    """The CSV of each figure that a cell shows, by file name."""
+def _files(cell: nbformat.NotebookNode, chapter: str) -> dict[str, bytes]:
+    """The numbers of each figure that a cell shows, by the name of their file."""
     shown = [output.get("data", {}) for output in cell.get("outputs", ())]
     found = [_moving(d[SLIDERS]) if SLIDERS in d else d.get(CSV) for d in shown]
     called = name(cell, chapter)
-    return {f"{called}{f'-{i}' * bool(i)}.csv": text for i, text in enumerate(filter(None, found))}
+    texts = [text.encode() for text in found if text]
+    names = [f"{called}{f'-{i}' * bool(i)}.csv" for i in range(len(texts))]
+    return dict(map(_packed, names, texts))
+
+
+def _packed(file: str, content: bytes) -> tuple[str, bytes]:
+    """A file as it is, or in an archive of its own, which any system and pandas open."""
+    if len(content) < HEAVY:
+        return file, content
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(zipfile.ZipInfo(file), content, zipfile.ZIP_DEFLATED)  # without a date
+    return f"{file}.zip", packed.getvalue()
 
 
 def _moving(data: Mapping) -> str:
@@ -78,4 +92,5 @@ def _moving(data: Mapping) -> str:
 def _link(address: str, title: str) -> str:
     """A link that says to all readers what it gives, and to those who do not see also of what."""
     of = f'<span class="visually-hidden"> of {html.escape(title)}</span>' if title else ""
-    return f'<p class="rcbook-data"><a href="{address}" download>Data (CSV){of}</a></p>'
+    packed = ", packed" * address.endswith(".zip")
+    return f'<p class="rcbook-data"><a href="{address}" download>Data (CSV{packed}){of}</a></p>'

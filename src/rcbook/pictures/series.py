@@ -62,14 +62,22 @@ def _title(ax: Axes) -> str:
 
 
 def _label(axis: Axis, ax: Axes) -> str:
-    """The label of an axis, which may stand at a panel that shares it, or beside all panels."""
+    """The label of an axis, which may stand at another panel of its column or row, or beside all."""
     is_x = axis is ax.xaxis
-    shared = (ax.get_shared_x_axes() if is_x else ax.get_shared_y_axes()).get_siblings(ax)
-    siblings = (other.get_xlabel() if is_x else other.get_ylabel() for other in shared)
+    beside = [other for other in ax.figure.axes if _same_line(ax, other, is_x)]
+    others = (other.get_xlabel() if is_x else other.get_ylabel() for other in beside)
     whole = ax.figure.get_supxlabel() if is_x else ax.figure.get_supylabel()
     polar = ("angle (rad)" if is_x else "radius") if ax.name == "polar" else ""
-    labels = (axis.get_label_text(), *siblings, whole, polar)
+    labels = (axis.get_label_text(), *others, whole, polar)
     return next((" ".join(label.split()) for label in labels if label.strip()), "xy"[not is_x])
+
+
+def _same_line(ax: Axes, other: Axes, column: bool) -> bool:
+    """Whether two panels stand in one column, or in one row, of a grid."""
+    place, there = ax.get_subplotspec(), other.get_subplotspec()
+    if place is None or there is None or place.get_gridspec() is not there.get_gridspec():
+        return False
+    return place.colspan == there.colspan if column else place.rowspan == there.rowspan
 
 
 def _shown(value: float | str) -> str:
