@@ -52,17 +52,19 @@ def _sources(project: Project) -> Iterable[Path]:
                 yield path
 
 
-def make(project: Project) -> Path:
-    """Print the rendered book of `project` to its build folder, whole or not at all.
+def browser() -> str:
+    """The path of an installed browser.  Raises RenderError when there is none."""
+    for name in BROWSERS:
+        if path := shutil.which(name):
+            return path
+    raise RenderError(f"no browser to print with; install one of {', '.join(BROWSERS)}")
 
-    Raises RenderError when no browser is installed.
-    """
-    found = [path for name in BROWSERS if (path := shutil.which(name))]
-    if not found:
-        raise RenderError(f"no browser to print with; install one of {', '.join(BROWSERS)}")
+
+def make(project: Project, browser: str) -> Path:
+    """Print the rendered book of `project` to its build folder, whole or not at all."""
     target = project.build / "rcbook.pdf"
     with tempfile.TemporaryDirectory(prefix="pdf-", dir=project.build) as folder:
-        printed = _printed(found[0], Path(folder), project.html)
+        printed = _printed(browser, Path(folder), project.html)
         os.replace(printed, target)
     return target
 
