@@ -1,13 +1,17 @@
 # make book: set up, execute every notebook, judge every claim, render book/_build/html/index.html
 # make test: set up, run the test suite        make check: as `book`, without rendering
+# make pdf: the book as one PDF, book/_build/rcbook.pdf; builds it first where it is not up to date
 # make bench: time the library against what else would answer, and store the run (ten minutes)
 # PYTHON=/path/to/python3.12 chooses the interpreter.
 
-.PHONY: book test check bench clean
+.PHONY: book pdf test check bench clean
 .DELETE_ON_ERROR:
 
 book: .venv/ready
 	.venv/bin/python -m rcbook.cli build
+
+pdf: .venv/ready
+	.venv/bin/python -m rcbook.cli pdf
 
 check: .venv/ready
 	.venv/bin/python -m rcbook.cli check

@@ -44,6 +44,8 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     build = commands.add_parser("build", help="execute, judge and render to book/_build/html")
     build.set_defaults(run=_build)
+    pdf = commands.add_parser("pdf", help="print the book to book/_build/rcbook.pdf")
+    pdf.set_defaults(run=_pdf)
     check = commands.add_parser("check", help="execute and judge; exit 1 when a verdict flips")
     check.add_argument("--paper", metavar="KEY", help="only this paper, with all its verdicts")
     check.set_defaults(run=_check)
@@ -93,6 +95,24 @@ def _build(_) -> int:
     try:
         print(f"open {render.render(project, judged)}")
     except render.RenderError as error:
+        print(f"rcbook: {error}", file=sys.stderr)
+        return FAILED
+    return OK
+
+
+def _pdf(arguments: argparse.Namespace) -> int:
+    from rcbook.book import pdf
+    from rcbook.book.project import find
+    from rcbook.book.render import RenderError
+
+    project = find(Path.cwd())
+    try:
+        browser = pdf.browser()  # before minutes are spent on a book that cannot be printed
+        if pdf.is_old(project) and _build(arguments) != OK:
+            return FAILED
+        print("printing the book ...", flush=True)
+        print(f"open {pdf.make(project, browser)}")
+    except RenderError as error:
         print(f"rcbook: {error}", file=sys.stderr)
         return FAILED
     return OK

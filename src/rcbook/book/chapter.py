@@ -13,7 +13,7 @@ from bs4 import BeautifulSoup, Tag
 from PIL import Image
 
 from rcbook import ledger
-from rcbook.book import links, sliders
+from rcbook.book import data, links, sliders
 from rcbook.book.execute import alternative
 from rcbook.ledger import show
 from rcbook.ledger.marks import without_marks
@@ -37,6 +37,7 @@ def shown(
     to read, has no marks of numbers, and ids in its ledgers lead to the ledger page.
     """
     notebook = nbformat.from_dict(notebook)
+    data.link(notebook.cells, PurePosixPath(name).stem)
     notebook.cells[0].source += f"\n\n{reading_time(notebook)}\n"
     texts = [cell for cell in notebook.cells if cell.cell_type == "markdown"]
     written = links.first_uses([without_marks(cell.source) for cell in texts], terms)
@@ -96,7 +97,7 @@ def figures(cells: Sequence[nbformat.NotebookNode], chapter: str) -> list[nbform
         if before is not None and _is_picture(before) and cell.source.startswith("**"):
             caption, _, rest = cell.source.partition("\n\n")
             figure = before.metadata["mystnb"].setdefault("figure", {})
-            figure.setdefault("name", f"fig-{chapter}-{before.get('id', '')}")
+            figure["name"] = data.name(before, chapter)
             figure["caption"] = caption
             cell.source = rest
         if cell.source.strip():
@@ -113,8 +114,8 @@ def _beside(cell: nbformat.NotebookNode) -> list[nbformat.NotebookNode]:
     if not others:
         return []
     cell.outputs = [o for o in cell.outputs if o not in others]
-    behind = nbformat.v4.new_code_cell("", metadata={"tags": ["remove-input"]}, outputs=others)
-    return [behind]
+    kept = {"metadata": {"tags": ["remove-input"]}, "outputs": others}
+    return [nbformat.v4.new_code_cell("# an empty cell would be skipped, outputs and all", **kept)]
 
 
 def _is_picture(cell: nbformat.NotebookNode) -> bool:

@@ -30,9 +30,10 @@ LIMIT = 900.0  # s per notebook; the slowest honest one needs about a sixth on t
 
 _ANSI = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 
-# Figures as lines and as pixels: the renderer takes what suits each.  A date would make two builds
-# of one commit differ.
+# Figures as lines and as pixels: the renderer takes what suits each, and writes their numbers,
+# which the extension adds.  A date would make two builds of one commit differ.
 _FIGURES = """
+c.InteractiveShellApp.extensions = ["rcbook.book.kernel"]
 c.InlineBackend.figure_formats = {"svg", "png"}
 c.InlineBackend.print_figure_kwargs = {"bbox_inches": "tight", "metadata": {"Date": None}}
 """

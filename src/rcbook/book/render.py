@@ -13,7 +13,7 @@ from pathlib import Path
 
 import nbformat
 
-from rcbook.book import chapter, cost, house, icons, links, pages, rerun
+from rcbook.book import chapter, cost, data, house, icons, links, pages, rerun, search
 from rcbook.book.execute import alternative, plain
 from rcbook.book.project import Project, read_text
 from rcbook.book.run import Run
@@ -39,6 +39,8 @@ def render(project: Project, run: Run) -> Path:
         fill(stage, project, run)
         _sphinx(stage)
         icons.replace(stage / "_build" / "html")
+        data.write(stage / "_build" / "html", run.notebooks)
+        search.summarise(stage / "_build" / "html")
         swap(stage / "_build" / "html", project.html, stage / "previous")
     finally:
         shutil.rmtree(stage, ignore_errors=True)

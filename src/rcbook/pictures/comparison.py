@@ -58,7 +58,8 @@ def draw_heat_map(
     shade = np.where(usual, (logs - low) / max(high - low, _SPAN), numbers > 0)
     shade = 0.75 * (1 - shade if high_is_good else shade)
     pale = np.ma.masked_where(np.isnan(numbers), shade)
-    ax.imshow(pale, cmap=colormaps["Greys"], vmin=0, vmax=1, aspect="auto")
+    image = ax.imshow(pale, cmap=colormaps["Greys"], vmin=0, vmax=1, aspect="auto")
+    image.numbers = numbers  # the build offers them as CSV
     for i, row in enumerate(values.index):
         for j, column in enumerate(values.columns):
             text = _shown(numbers[i, j], never) + "*" * bool(
