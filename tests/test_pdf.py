@@ -212,7 +212,7 @@ def test_links_of_the_pdf_lead_to_its_pages(printed):
 
 @pytest.fixture(scope="module")
 def sheet():
-    """A tab as wide as a sheet of paper; made after `printed`, as there is one browser at a time."""
+    """A tab as wide as a sheet of paper; after `printed`, since one browser runs at a time."""
     try:
         browser = pdf.browser()
     except RenderError as error:
