@@ -7,6 +7,7 @@ from importlib import resources
 from pathlib import Path
 
 import pytest
+from bs4 import BeautifulSoup
 from playwright.sync_api import sync_playwright
 
 from rcbook import ledger
@@ -99,11 +100,65 @@ def test_no_page_names_a_script_style_or_picture_of_another_host(built):
         assert not imports.search(path.read_text(encoding="utf-8")), path
 
 
+OFF_SCREEN = """() => [...document.querySelectorAll("article :is(td, tbody th)")].filter((cell) => {
+    const box = cell.getBoundingClientRect();
+    return box.width && (box.left < 0 || box.right > 391);
+}).map((cell) => cell.textContent)"""
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_no_page_scrolls_sideways_on_a_phone(visit, built, scheme):
+    """Neither does a table: its rows are cards, and no cell is off the screen."""
     for page in pages(built):
         tab = visit(page, width=390, scheme=scheme)
         assert tab.evaluate("document.documentElement.scrollWidth") <= 390, page
+        for folded in tab.locator("article details").all():
+            folded.evaluate("e => e.open = true")
+        assert tab.evaluate(OFF_SCREEN) == [], page
+
+
+def chapters(built: Path) -> dict[str, BeautifulSoup]:
+    """The chapters' pages, parsed."""
+    found = (built / "book" / "_build" / "html" / "notebooks").glob("*.html")
+    return {p.name: BeautifulSoup(p.read_text(encoding="utf-8"), "html.parser") for p in found}
+
+
+def test_a_chapter_shows_nothing_raw(built):
+    """No table or value as Python prints it, no markup, and no bar with nothing below it."""
+    for name, page in chapters(built).items():
+        article = page.find("article")
+        assert not article.select("table.dataframe, .output.text_plain, .output.stream"), name
+        for bar in article.select("div.cell.tag_hide-input"):
+            assert bar.select(".cell_output"), f"{name}: {bar.text[:80]}"
+        for code in article(["pre", "script", "code"]):
+            code.decompose()
+        for formula in article.select(".math"):
+            formula.decompose()
+        raw = re.search(r"\{\w+\}`|\$[^$]*\$|:::|\*\*|\]\(|<!--", article.text)
+        assert not raw, f"{name}: {article.text[raw.start() - 60 : raw.end() + 60]!r}"
+
+
+def test_every_figure_and_displayed_equation_of_a_chapter_has_its_number(built):
+    for name, page in chapters(built).items():
+        number = {int(page.select_one("h1 .section-number").text.strip(" ."))}
+        captions = page.select("figure figcaption")
+        assert len(captions) == len(page.select("article figure img")), name
+        shown = [c.select_one(".caption-number").text.split()[-1] for c in captions]
+        assert shown == [f"{min(number)}.{i + 1}" for i in range(len(shown))], name
+        equations = [e.text.strip("()¶# \n") for e in page.select("article .eqno")]
+        assert equations == [f"{min(number)}.{i + 1}" for i in range(len(equations))], name
+        assert len(equations) == len(page.select("article div.math")), name
+
+
+def test_a_chapter_leads_to_functions_and_words_and_hands_out_its_notebook(built):
+    """The notebook that is handed out is the committed one, without marks of ours in the way."""
+    html = built / "book" / "_build" / "html" / "notebooks"
+    for name, page in chapters(built).items():
+        assert page.select("article .cell_input a[href*='api.html#rcbook.']"), name
+        assert page.select("article a[href*='glossary.html#term-']"), name
+        (given,) = page.select("article a.download[href$='.ipynb']")
+        notebook = (html / given["href"]).read_bytes()
+        assert notebook == (built / "notebooks" / name.replace(".html", ".ipynb")).read_bytes()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
