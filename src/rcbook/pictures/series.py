@@ -62,7 +62,7 @@ def _title(ax: Axes) -> str:
 
 
 def _label(axis: Axis, ax: Axes) -> str:
-    """The label of an axis, which may stand at another panel of its column or row, or beside all."""
+    """The label of an axis; it may stand at another panel of its column or row, or beside all."""
     is_x = axis is ax.xaxis
     beside = [other for other in ax.figure.axes if _same_line(ax, other, is_x)]
     others = (other.get_xlabel() if is_x else other.get_ylabel() for other in beside)
