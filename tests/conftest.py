@@ -12,11 +12,24 @@ from pathlib import Path
 
 import nbformat
 import pytest
+from playwright.sync_api import sync_playwright
 
 from rcbook.book.project import Project
 from rcbook.ledger import show
 
 ROOT = Path(__file__).parents[1]
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+# No sandbox: continuous integration runs as root.  The others keep the browser itself quiet.
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
 
 FAKE_PAPER = """
 from rcbook.ledger import Claim, Ledger, Paper
@@ -115,6 +128,45 @@ def rows(built, request) -> list[dict]:
     rows = json.loads((built / "book" / "_build" / "ledger.json").read_text(encoding="utf-8"))
     request.config.stash[_COUNTS] = show.counts(rows)
     return rows
+
+
+@pytest.fixture(scope="module")
+def browser():
+    """A browser that is installed already; none is ever downloaded."""
+    found = [path for name in NAMES if (path := shutil.which(name))]
+    if not found:
+        pytest.skip(f"no browser found; install one of {', '.join(NAMES)}")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=found[0], args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def visit(browser, built):
+    """Opens a page of the book; requests to other hosts and errors are collected and refused."""
+    contexts, trouble = [], []
+
+    def visit(page: str, width: int = 1400, scheme: str = "light"):
+        context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+        contexts.append(context)
+        context.route(re.compile("^(https?|wss?):"), lambda route: refuse(route))
+        tab = context.new_page()
+        tab.on("console", lambda m: m.type == "error" and trouble.append(f"{page}: {m.text}"))
+        tab.on("pageerror", lambda error: trouble.append(f"{page}: {error}"))
+        tab.goto((built / "book" / "_build" / "html").as_uri() + "/" + page)
+        tab.wait_for_function("window.MathJax?.startup ? true : !window.MathJax")
+        tab.evaluate("window.MathJax?.startup?.promise")
+        return tab
+
+    def refuse(route):
+        trouble.append(f"asks {route.request.url}")
+        route.abort()
+
+    yield visit
+    for context in contexts:
+        context.close()
+    assert not trouble
 
 
 _COUNTS = pytest.StashKey[str]()

@@ -2,68 +2,16 @@
 
 import math
 import re
-import shutil
 from importlib import resources
 from pathlib import Path
 
 import nbformat
 import pytest
 from bs4 import BeautifulSoup
-from playwright.sync_api import sync_playwright
 
 from rcbook import ledger
 
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-# No sandbox: continuous integration runs as root.  The others keep the browser itself quiet.
-ARGUMENTS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 SPHINX_ALONE = {"search.html"}  # made without a source of ours
-
-
-@pytest.fixture(scope="module")
-def browser():
-    """A browser that is installed already; none is ever downloaded."""
-    found = [path for name in NAMES if (path := shutil.which(name))]
-    if not found:
-        pytest.skip(f"no browser found; install one of {', '.join(NAMES)}")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=found[0], args=ARGUMENTS)
-        yield browser
-        browser.close()
-
-
-@pytest.fixture
-def visit(browser, built):
-    """Opens a page of the book; requests to other hosts and errors are collected and refused."""
-    contexts, trouble = [], []
-
-    def visit(page: str, width: int = 1400, scheme: str = "light"):
-        context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
-        contexts.append(context)
-        context.route(re.compile("^(https?|wss?):"), lambda route: refuse(route))
-        tab = context.new_page()
-        tab.on("console", lambda m: m.type == "error" and trouble.append(f"{page}: {m.text}"))
-        tab.on("pageerror", lambda error: trouble.append(f"{page}: {error}"))
-        tab.goto((built / "book" / "_build" / "html").as_uri() + "/" + page)
-        tab.wait_for_function("window.MathJax?.startup ? true : !window.MathJax")
-        tab.evaluate("window.MathJax?.startup?.promise")
-        return tab
-
-    def refuse(route):
-        trouble.append(f"asks {route.request.url}")
-        route.abort()
-
-    yield visit
-    for context in contexts:
-        context.close()
-    assert not trouble
 
 
 def pages(built: Path) -> list[str]:
@@ -176,17 +124,13 @@ def test_a_chapter_leads_to_functions_and_words_and_hands_out_its_notebook(built
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_text_stands_out_and_pictures_are_on_white(visit, scheme, built):
+def test_text_stands_out(visit, scheme, built):
     """Contrast of at least 7 between text and page, in either theme."""
     tab = visit("ledger.html", scheme=scheme)
     assert tab.evaluate("document.documentElement.dataset.theme") == scheme
     colours = "e => [getComputedStyle(e).color, getComputedStyle(document.body).backgroundColor]"
     ink, paper = tab.locator("table.rcbook-full td").first.evaluate(colours)
     assert contrast(ink, paper) >= 7
-    tab = visit("index.html", scheme=scheme)
-    if scheme == "dark":
-        white = "e => getComputedStyle(e).backgroundColor"
-        assert tab.locator("main img").first.evaluate(white) == "rgb(255, 255, 255)"
 
 
 def contrast(ink: str, paper: str) -> float:
@@ -321,11 +265,6 @@ def test_every_picture_has_words(visit, built):
             assert not alt.startswith("_images"), page
 
 
-def test_search_finds_from_a_folder(visit):
-    tab = visit("search.html?q=runout")
-    tab.wait_for_selector("#search-results li a", timeout=15_000)
-
-
 # ---- pictures with sliders ----
 
 
@@ -383,9 +322,9 @@ def test_a_picture_is_moved_from_the_keyboard(visit, built, scheme):
 
 
 def test_a_moved_picture_shows_what_a_closed_form_gives(visit):
-    """Passes of Q have the gain of a power of the cosine of half the angle."""
+    """Passes of q have the gain of a power of the cosine of half the angle."""
     tab = visit("notebooks/one_idea.html")
-    passes = started(tab).get_by_role("slider", name="passes of Q")
+    passes = started(tab).get_by_role("slider", name="passes of q")
     passes.focus()
     tab.keyboard.press("Home")
     for count in range(4):
@@ -398,7 +337,7 @@ def test_a_moved_picture_shows_what_a_closed_form_gives(visit):
 def test_a_picture_with_sliders_stands_still_in_print_and_without_scripts(visit, browser, built):
     page = "notebooks/one_idea.html"
     tab = visit(page)
-    picture, still = started(tab), tab.locator(".cell_output:has(.rcbook-sliders) img").first
+    picture, still = started(tab), tab.locator("figure:has(.rcbook-sliders) img").first
     assert picture.is_visible()
     assert not still.is_visible()
     tab.emulate_media(media="print")
@@ -407,6 +346,7 @@ def test_a_picture_with_sliders_stands_still_in_print_and_without_scripts(visit,
     context = browser.new_context(java_script_enabled=False)
     tab = context.new_page()
     tab.goto((built / "book" / "_build" / "html").as_uri() + "/" + page)
-    assert tab.locator(".cell_output:has(.rcbook-sliders) img").first.is_visible()
+    before = "xpath=preceding::figure[1]//img"  # without scripts it stands in the cell before
+    assert tab.locator(".rcbook-sliders").first.locator(before).is_visible()
     assert not tab.locator(".rcbook-sliders").first.is_visible()
     context.close()

@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
 from matplotlib.patches import StepPatch
-from matplotlib.ticker import FixedFormatter, FixedLocator, FuncFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter
 
 COLUMNS = ("panel", "series", "x_name", "y_name", "x", "y", "value")
 DIGITS = 6
@@ -200,10 +200,8 @@ def _of_map(artist: ContourSet | QuadMesh | AxesImage) -> str:
 def _named(axis: Axis, places: np.ndarray) -> list:
     """`places`, or the words at the ticks of `axis` where each of them has one."""
     shown, at = axis.get_major_formatter(), axis.get_major_locator()
-    # Matplotlib keeps words that are given with their places as a function.
-    if not isinstance(shown, FixedFormatter | FuncFormatter) or not isinstance(at, FixedLocator):
-        return list(places)
-    told = zip(at.locs, shown.format_ticks(at.locs), strict=False)
-    words = {round(float(place), 9): word for place, word in told}
+    if not isinstance(shown, FuncFormatter) or not isinstance(at, FixedLocator):
+        return list(places)  # where words are given to ticks, a function finds them by their places
+    words = {round(float(p), 9): shown(p) for p in at.locs}
     found = [words.get(round(float(place), 9), "") for place in places]
     return found if all(found) else list(places)
