@@ -13,7 +13,7 @@ from bs4 import BeautifulSoup, Tag
 # What a reader of paper has no use for: code that was folded, what moves, what filters, what saves.
 _DROPPED = (
     ".headerlink, script, style, form, button, details.hide, .rcbook-sliders, .rcbook-data, "
-    ".section-nav"
+    "a[download], .section-nav"
 )
 _ANSWER = "Check yourself"  # the summary of what solves an exercise
 _POINTS_AT = ("aria-labelledby", "aria-describedby", "aria-controls")

@@ -6,10 +6,11 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Error, Page, sync_playwright
 
 from rcbook.book import onepage
 from rcbook.book.project import Project
@@ -61,35 +62,48 @@ def browser() -> str:
 
 
 def make(project: Project, browser: str) -> Path:
-    """Print the rendered book of `project` to its build folder, whole or not at all."""
+    """Print the rendered book of `project` to its build folder, whole or not at all.
+
+    Raises RenderError when the browser fails; an earlier PDF then stays.
+    """
     target = project.build / "rcbook.pdf"
     with tempfile.TemporaryDirectory(prefix="pdf-", dir=project.build) as folder:
-        printed = _printed(browser, Path(folder), project.html)
-        os.replace(printed, target)
+        try:
+            os.replace(_printed(browser, Path(folder), project.html), target)
+        except Error as error:
+            raise RenderError(f"{error}\nthe book could not be printed by {browser}") from None
     return target
 
 
 def _printed(browser: str, folder: Path, book: Path) -> Path:
     """The PDF in `folder`: printed once to see where chapters begin, and again with their pages."""
     source, printed = folder / "book.html", folder / "book.pdf"
+    names = [place.id for place in onepage.contents(book)]
+    begins: dict[str, int] = {}
+    with sheet(browser) as page:
+        for _ in range(2):
+            source.write_text(onepage.write(book, begins), encoding="utf-8")
+            show(page, source)
+            _print(page, printed)
+            begins = chapter_pages(printed.read_bytes(), names)
+    return printed
+
+
+@contextmanager
+def sheet(browser: str) -> Iterator[Page]:
+    """A tab of `browser` that is as wide as the print and asks no other host for anything."""
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=browser)
         page = chromium.new_page(viewport={"width": WIDTH, "height": 1000}, color_scheme="light")
         page.route(re.compile("^(https?|wss?):"), lambda route: route.abort())
         page.emulate_media(media="print")
-        begins: dict[str, int] = {}
-        for _ in range(2):
-            source.write_text(onepage.write(book, begins), encoding="utf-8")
-            _open(page, source)
-            _print(page, printed)
-            begins = chapter_pages(printed.read_bytes(), [p.id for p in onepage.contents(book)])
+        page.set_default_timeout(PATIENCE)
+        yield page
         chromium.close()
-    return printed
 
 
-def _open(page: Page, source: Path) -> None:
-    """Show `source`, typeset and with all its pictures, nothing of it wider than the page."""
-    page.set_default_timeout(PATIENCE)
+def show(page: Page, source: Path) -> None:
+    """Open `source`, typeset and with all its pictures, nothing of it wider than the page."""
     page.goto(source.as_uri(), timeout=PATIENCE)
     page.evaluate("window.MathJax?.startup?.promise")
     page.evaluate("Promise.all([...document.images].map(image => image.decode()))")
