@@ -86,7 +86,8 @@ def make(tmp_path):
         ignore = shutil.ignore_patterns("_build")
         shutil.copytree(ROOT / "book", tmp_path / "book", ignore=ignore)
         contents = tmp_path / "book" / "_toc.yml"
-        parts = r"(  - caption: .*\n    chapters:\n(?:      - file: notebooks/.*\n)+)+"
+        files = r"    chapters:\n(?:      - file: notebooks/.*\n)+"
+        parts = rf"(  - caption: .*\n(?:    numbered: .*\n)?{files})+"
         one = "  - caption: Chapters\n    chapters:\n      - glob: notebooks/*\n"
         contents.write_text(re.sub(parts, one, contents.read_text("utf-8")), encoding="utf-8")
         landing = tmp_path / "book" / "index.md"  # without links to chapters that are not here

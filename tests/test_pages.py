@@ -5,6 +5,7 @@ import re
 from importlib import resources
 from pathlib import Path
 
+import nbformat
 import pytest
 from bs4 import BeautifulSoup
 
@@ -31,6 +32,19 @@ def test_every_page_loads_and_typesets(visit, built):
         assert r"\(" not in shown, page
         assert r"\[" not in shown, page
         assert tab.locator("mjx-merror").count() == 0, page
+
+
+def test_the_cover_leads_to_the_chapter_that_draws_it(built):
+    html = built / "book" / "_build" / "html"
+    page = BeautifulSoup((html / "index.html").read_text(encoding="utf-8"), "html.parser")
+    (chapter,) = (
+        path.stem
+        for path in (built / "notebooks").glob("*.ipynb")
+        for cell in nbformat.read(path, as_version=4).cells
+        if "cover" in cell.metadata.get("tags", ())
+    )
+    first = page.select_one("article a[href^='notebooks/']")
+    assert first["href"] == f"notebooks/{chapter}.html"
 
 
 @pytest.mark.parametrize("page", ["index.html", "ledger.html", "errata.html"])

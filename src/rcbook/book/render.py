@@ -51,7 +51,7 @@ def fill(stage: Path, project: Project, run: Run) -> None:
     """Put everything the renderer reads into `stage`, an existing folder."""
     ignore = shutil.ignore_patterns("_build")
     shutil.copytree(project.book, stage, ignore=ignore, dirs_exist_ok=True)
-    name, cell, png = cover(run.notebooks)
+    source, cell, png = cover(run.notebooks)
     (stage / "cover.png").write_bytes(png)
     shutil.copy(mathjax(), stage / "assets")
     shutil.copy(bokeh(), stage / "assets")
@@ -67,7 +67,8 @@ def fill(stage: Path, project: Project, run: Run) -> None:
         shutil.copy(project.notebooks / name, stage / "downloads")
     written = {page.name: read_text(page) for page in project.book.glob("*.md")}
     made = pages.pages(project.papers, run.rows)
-    made["cover.md"] = pages.cover(name, run.notebooks[name].cells[0].source, alternative(cell))
+    title = run.notebooks[source].cells[0].source
+    made["cover.md"] = pages.cover(source, title, alternative(cell))
     measured = cost.read(project.book)
     for name, picture in (house.pictures() | cost.pictures(measured)).items():
         (stage / name).write_bytes(picture)

@@ -15,6 +15,7 @@ from bs4 import BeautifulSoup, Tag
 TEXTS = "search-texts.js"
 _SILENT = {"script", "style", "form", "svg"}
 _NOT_TEXT = {"headerlink", "rcbook-sliders", "rcbook-data", "admonition-title"}
+_PLACES = {"section", "dt"}  # what a hit may lead to
 _INSIDE = {"a", "b", "code", "em", "i", "small", "span", "strong", "sub", "sup"}  # of a line
 _TOOLS = re.compile(r'<script src="(_static/)searchtools\.js[^"]*"></script>')
 _PLAIN = re.compile(r"[^\\]*")  # a formula that can be read as it is typed
@@ -56,8 +57,8 @@ def _said(tag: Tag) -> str:
         return _formula(tag)
     parts = (_said(part) if isinstance(part, Tag) else html.escape(part) for part in tag.children)
     inner = "".join(parts)
-    if tag.name == "section" and tag.get("id"):
-        return f'<section id="{html.escape(tag["id"])}">{inner}</section>'
+    if tag.name in _PLACES and tag.get("id"):
+        return f'<{tag.name} id="{html.escape(tag["id"])}">{inner} </{tag.name}>'
     return inner if tag.name in _INSIDE else f"{inner} "
 
 
