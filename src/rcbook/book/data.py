@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import html
 import io
 import re
 import zipfile
@@ -14,6 +13,7 @@ from pathlib import Path, PurePosixPath
 import nbformat
 
 from rcbook.book.execute import figure
+from rcbook.ledger import show
 from rcbook.ledger.marks import without_marks
 from rcbook.pictures.sliders import MIME as SLIDERS
 
@@ -91,6 +91,6 @@ def _moving(data: Mapping) -> str:
 
 def _link(address: str, title: str) -> str:
     """A link that says to all readers what it gives, and to those who do not see also of what."""
-    of = f'<span class="visually-hidden"> of {html.escape(title)}</span>' if title else ""
+    of = f'<span class="visually-hidden"> of {show.math(title)}</span>' if title else ""
     packed = ", packed" * address.endswith(".zip")
     return f'<p class="rcbook-data"><a href="{address}" download>Data (CSV{packed}){of}</a></p>'
