@@ -138,8 +138,15 @@ assert os.path.basename(os.getcwd()) == "notebooks\""""
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no such signals")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupt_leaves_nothing_behind(make, number):
+@pytest.mark.parametrize(
+    ("number", "ctrl_c"),
+    [
+        (signal.SIGINT, signal.SIG_DFL),
+        (signal.SIGTERM, signal.SIG_DFL),
+        (signal.SIGTERM, signal.SIG_IGN),  # as a shell starts a job in the background
+    ],
+)
+def test_an_interrupt_leaves_nothing_behind(make, number, ctrl_c):
     project = make(one=[LEDGER, PID, "import time; time.sleep(60)"])
     for paper in map(ledger.load, ledger.papers()):  # the command looks for all of the package
         for chapter in paper.chapters:
@@ -150,7 +157,11 @@ def test_an_interrupt_leaves_nothing_behind(make, number):
             nbformat.write(stub, project.notebooks / chapter.notebook)
     run.write(project.ledger_file, "old\n")
     command = [sys.executable, "-m", "rcbook.cli", "check"]
-    process = subprocess.Popen(command, cwd=project.root, stdout=-1, stderr=-1)
+    before = signal.signal(signal.SIGINT, ctrl_c)  # a child inherits whether it is ignored
+    try:
+        process = subprocess.Popen(command, cwd=project.root, stdout=-1, stderr=-1)
+    finally:
+        signal.signal(signal.SIGINT, before)
     pid = project.notebooks / "pid"
     for _ in range(600):
         if pid.is_file() and pid.read_text():
