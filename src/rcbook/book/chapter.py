@@ -161,13 +161,13 @@ def table(html: str) -> str:
         for cell in drawn(True):
             cell.attrs = {}
         drawn.attrs = {}
-        for head in drawn.select("thead th"):
+        for head in drawn("th"):
             _set_head(head)
     return str(soup)
 
 
 def _set_head(head: Tag) -> None:
-    """An empty corner heads no column; a formula in a head is marked for MathJax."""
+    """An empty corner heads nothing; a formula in a head is marked for MathJax."""
     text = head.get_text(strip=True)
     if not text:
         head.name = "td"
