@@ -14,12 +14,13 @@ import nbformat
 import pytest
 from playwright.sync_api import sync_playwright
 
+from rcbook.book import pdf
 from rcbook.book.project import Project
+from rcbook.book.render import RenderError
 from rcbook.ledger import show
 
 ROOT = Path(__file__).parents[1]
 
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 # No sandbox: continuous integration runs as root.  The others keep the browser itself quiet.
 ARGUMENTS = [
     "--no-sandbox",
@@ -133,11 +134,12 @@ def rows(built, request) -> list[dict]:
 @pytest.fixture(scope="module")
 def browser():
     """A browser that is installed already; none is ever downloaded."""
-    found = [path for name in NAMES if (path := shutil.which(name))]
-    if not found:
-        pytest.skip(f"no browser found; install one of {', '.join(NAMES)}")
+    try:
+        found = pdf.browser()
+    except RenderError as error:
+        pytest.skip(str(error))
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=found[0], args=ARGUMENTS)
+        browser = playwright.chromium.launch(executable_path=found, args=ARGUMENTS)
         yield browser
         browser.close()
 

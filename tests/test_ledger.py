@@ -757,7 +757,7 @@ def test_a_shown_ledger_tabulates_all_but_the_reproduced_and_delivers_all(folder
     book = filled(folder)
     bundle = book._repr_mimebundle_()
     assert len(bundle[ledger.MIME]) == 2
-    assert "2 claims, 2 of them results (1 headlines): 1 reproduced" in bundle["text/html"]
+    assert "2 claims, 2 of them results (1 headline): 1 reproduced" in bundle["text/html"]
     assert "<code>paper.a</code>" not in bundle["text/html"]
     book.check("paper.a", 0.9)  # flipped: now it is shown
     assert "<code>paper.a</code>" in book._repr_mimebundle_()["text/html"]

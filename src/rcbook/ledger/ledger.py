@@ -51,6 +51,10 @@ class Ledger:
             raise ValueError(f"{key}.toml has no chapter {notebook!r}; it has {', '.join(names)}")
         return cls(paper, notebook=notebook)
 
+    @property
+    def _here(self) -> str:
+        return self.notebook or self.paper.notebook
+
     def check(self, id: str, value: object = None, corrected: object = None, **evidence):
         """Judge claim `id` (see `judge`), keep the judgement and return it.
 
@@ -61,7 +65,7 @@ class Ledger:
                 f"{self.paper.key} has no claim {id!r}; see papers/{self.paper.key}.toml"
             )
         place = self.paper.place(self.paper.claims[id])
-        if place != (self.notebook or self.paper.notebook):
+        if place != self._here:
             raise ValueError(f"{id} is judged in {place}; check it there")
         self.judgements[id] = judge(self.paper.claims[id], value, corrected, **evidence)
         self._fresh[:] = [*(fresh for fresh in self._fresh if fresh != id), id]
@@ -84,8 +88,8 @@ class Ledger:
 
     def missing(self) -> list[str]:
         """Ids of the claims of this notebook that are not checked yet."""
-        claims, here = self.paper.claims, self.notebook or self.paper.notebook
-        own = (id for id, claim in claims.items() if self.paper.place(claim) == here)
+        claims = self.paper.claims.items()
+        own = (id for id, claim in claims if self.paper.place(claim) == self._here)
         return [id for id in own if id not in self.judgements]
 
     def rows(self) -> list[dict]:

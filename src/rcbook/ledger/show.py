@@ -152,13 +152,14 @@ def anchor_of(id: str) -> str:
 
 
 def counts(rows: Iterable[Mapping]) -> str:
-    """`'5 claims, 4 of them results (1 headlines): 3 reproduced, ...'` for ledger rows."""
+    """`'5 claims, 4 of them results (1 headline): 3 reproduced, ...'` for ledger rows."""
     rows = list(rows)
     scored = [row for row in rows if row["role"] in SCORED]
     tally = Counter(row["verdict"] for row in scored)
     parts = ", ".join(f"{tally[verdict]} {verdict}" for verdict in VERDICTS)
     headlines = sum(row["role"] == "headline" for row in scored)
+    first = f"{headlines} headline{'s' * (headlines != 1)}"
     return (
-        f"{len(rows)} claims, {len(scored)} of them results ({headlines} headlines): {parts}; "
+        f"{len(rows)} claims, {len(scored)} of them results ({first}): {parts}; "
         f"{len(rows) - len(scored)} inputs and identities outside the score"
     )
