@@ -150,7 +150,11 @@ def visit(browser, built):
     contexts, trouble = [], []
 
     def visit(page: str, width: int = 1400, scheme: str = "light"):
-        context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+        context = browser.new_context(
+            viewport={"width": width, "height": 900},
+            color_scheme=scheme,
+            reduced_motion="reduce",  # colours halfway between two states are no colours of ours
+        )
         contexts.append(context)
         context.route(re.compile("^(https?|wss?):"), lambda route: refuse(route))
         tab = context.new_page()
